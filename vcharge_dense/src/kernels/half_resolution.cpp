@@ -64,6 +64,9 @@ SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const Sweep
   SweepInput input = half.makeInput(half_pixels.reference);
   std::vector<std::optional<SweepNeighbour>> halves(half_pixels.neighbours.size());
   tbb::parallel_for(size_t{0}, halves.size(), [&](size_t n) {
+    if (half_pixels.neighbours[n].empty()) {
+      return;
+    }
     const SweepNeighbour& from = fine.neighbours[n];
     const cv::Mat other_mask = from.other_mask.empty() ? cv::Mat() : halvedMask(from.other_mask);
     halves[n].emplace(SweepNeighbour{
@@ -72,7 +75,9 @@ SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const Sweep
         other_mask});
   });
   for (std::optional<SweepNeighbour>& neighbour : halves) {
-    input.neighbours.push_back(std::move(*neighbour));
+    if (neighbour) {
+      input.neighbours.push_back(std::move(*neighbour));
+    }
   }
   return input;
 }

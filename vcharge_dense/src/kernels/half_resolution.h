@@ -33,7 +33,8 @@ cv::Mat halvedMask(const cv::Mat& mask);
 std::unique_ptr<const SweepLevel> halfLevel(const SweepLevel& fine, const PlaneSweepOptions& options,
                                             const std::optional<Plane>& ground_in_camera);
 
-/// Input for a level of half the size, with the poses of `fine`. `half_pixels`: halved images in its order.
+/// Input for a level of half the size, with the poses of `fine`. `half_pixels`: halved images in its order;
+/// neighbours without pixels are left out.
 SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const SweepPixels& half_pixels);
 
 }  // namespace vcharge

@@ -5,8 +5,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "kernels/half_resolution.h"
-
 namespace vcharge {
 namespace {
 
@@ -14,9 +12,10 @@ namespace {
 // All planes are swept if a smaller fraction of a tile's pixels with texture is confident.
 constexpr double kMinConfidentFraction = 0.3;
 constexpr int kMinConfident = 16;
-constexpr int kReach_px = 2;      // margin of pixels around a tile that also select its planes
-constexpr int kMinCount = 8;      // minimum number of confident pixels that select a plane
-constexpr int kMarginPlanes = 1;  // planes on both sides of a selected one that are swept too
+constexpr size_t kMinHalvedSide = 4;  // number of images on one side of which half are left out
+constexpr int kReach_px = 2;          // margin of pixels around a tile that also select its planes
+constexpr int kMinCount = 8;          // minimum number of confident pixels that select a plane
+constexpr int kMarginPlanes = 1;      // planes on both sides of a selected one that are swept too
 
 /// Slots of the selected planes and their margin, with a gap where planes are left out.
 std::vector<int> slotsOf(const std::vector<int>& counts) {
@@ -54,6 +53,27 @@ bool hasGaps(const TilePlanes& planes) {
   });
 }
 
+/// Drops the pixels of the neighbours at every second baseline from the second shortest on, on each side.
+void leaveOutHalf(const SweepInput& fine, SweepPixels* half_pixels) {
+  for (const bool after : {false, true}) {
+    std::vector<size_t> side;
+    for (size_t n = 0; n < fine.neighbours.size(); ++n) {
+      if (fine.neighbours[n].after == after) {
+        side.push_back(n);
+      }
+    }
+    if (side.size() < kMinHalvedSide) {
+      continue;
+    }
+    std::stable_sort(side.begin(), side.end(), [&](size_t a, size_t b) {
+      return fine.neighbours[a].translation_m.norm() < fine.neighbours[b].translation_m.norm();
+    });
+    for (size_t i = 1; i < side.size(); i += 2) {
+      half_pixels->neighbours[side[i]].release();
+    }
+  }
+}
+
 }  // namespace
 
 CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera)
@@ -61,10 +81,15 @@ CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::option
   PlaneSweepOptions options = fine_->options();
   options.num_planes = std::max(3, (options.num_planes + 1) / 2);
   options.num_ground_planes = std::max(3, (options.num_ground_planes + 1) / 2);
+  options.warp_tolerance_px *= 2.0;
   level_ = halfLevel(*fine_, options, ground_in_camera);
 }
 
-SurfaceEstimate CoarsePass::sweep(const SweepInput& half_input) const {
+SurfaceEstimate CoarsePass::sweep(const SweepInput& fine, SweepPixels half_pixels, bool is_predicted) const {
+  if (is_predicted) {
+    leaveOutHalf(fine, &half_pixels);
+  }
+  const SweepInput half_input = halfInput(*level_, fine, half_pixels);
   const std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kLarge);
   return level_->sweepPlanes(half_input, tiles, {});
 }

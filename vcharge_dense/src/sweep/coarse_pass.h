@@ -6,8 +6,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "kernels/half_resolution.h"
 #include "sweep/sweep_level.h"
-#include "vcharge_dense/plane_sweep.h"
 
 namespace vcharge {
 
@@ -25,8 +25,10 @@ class CoarsePass {
   CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera);
 
   const SweepLevel& level() const { return *level_; }
-  /// `half_input`: made by halfInput() for level().
-  SurfaceEstimate sweep(const SweepInput& half_input) const;
+  /// `half_pixels`: the halved images of `fine`. Where an earlier map predicts the surface, the images at
+  /// every second baseline on each side of the reference suffice, from the shortest on, if at least two
+  /// remain.
+  SurfaceEstimate sweep(const SweepInput& fine, SweepPixels half_pixels, bool is_predicted) const;
 
   /// The planes of each tile: those near the planes that confident pixels in and around it found, or all
   /// planes if too few pixels are confident.

@@ -167,7 +167,7 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   for (const SweepImage& image : setup.sequence.neighbours) {
     images.neighbours.push_back(image.pixels);
   }
-  const SurfaceEstimate found = coarse.sweep(halfInput(coarse.level(), input, halved(images)));
+  const SurfaceEstimate found = coarse.sweep(input, halved(images), false);
   EXPECT_EQ(found.score.size(), cv::Size(kSize.width / 2, kSize.height / 2));
   const std::vector<TilePlanes> choice = coarse.choosePlanes(found, setup.tiles);
   const Hypotheses& planes = setup.level->planes().front();
@@ -195,6 +195,33 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   EXPECT_LT(swept, 0.5 * all);
   EXPECT_GT(pixels, 0.8 * kSize.area());
   EXPECT_GT(covered, 0.97 * pixels);
+}
+
+TEST(CoarsePassTest, HalfOfTheImagesFindASurfaceThatIsPredicted) {
+  const Level setup;
+  const CoarsePass coarse(setup.level, setup.sequence.ground);
+  SweepPixels images{setup.sequence.reference.pixels, {}};
+  for (const SweepImage& image : setup.sequence.neighbours) {
+    images.neighbours.push_back(image.pixels);
+  }
+  const SweepPixels half = halved(images);
+  const SurfaceEstimate with_all = coarse.sweep(setup.input(), half, false);
+  const SurfaceEstimate with_half = coarse.sweep(setup.input(), half, true);
+  int confident = 0, agree = 0, voters = 0;
+  for (int y = 0; y < with_all.score.rows; ++y) {
+    for (int x = 0; x < with_all.score.cols; ++x) {
+      voters |= with_half.voters.at<int>(y, x);
+      if (isConfident(with_half.score.at<float>(y, x), with_half.second_score.at<float>(y, x))) {
+        ++confident;
+        const float difference =
+            with_half.inverse_range.at<float>(y, x) - with_all.inverse_range.at<float>(y, x);
+        agree += std::abs(difference) <= with_all.step.at<float>(y, x) ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(voters, 3) << "two of four images";
+  EXPECT_GT(confident, 0.4 * with_all.score.size().area());
+  EXPECT_GT(agree, 0.97 * confident);
 }
 
 TEST(CoarsePassTest, SecondPeaksOfPlanesThatWereLeftOutCount) {

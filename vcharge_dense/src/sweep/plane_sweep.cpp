@@ -92,7 +92,8 @@ SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixe
   if (!coarse_) {
     return level_->sweepPlanes(input, large_tiles, {});
   }
-  const SurfaceEstimate coarse = coarse_->sweep(halfInput(coarse_->level(), input, half_pixels));
+  const SurfaceEstimate coarse =
+      coarse_->sweep(input, half_pixels, memory != nullptr && memory->predictsMuch());
   std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kSmall);
   SurfaceEstimate estimate(level_->validMask().size());
   if (memory != nullptr) {
@@ -146,7 +147,8 @@ RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, S
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options().num_refinement_steps > 0) {
-    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
+    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate),
+                          makeTiles(size, TileSize::kLow), &estimate);
   }
 
   RangeMap map{Timestamp(), "", "", level_->camera(), {}, {}, {}};

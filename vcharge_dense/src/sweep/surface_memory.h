@@ -19,6 +19,9 @@ class SurfaceMemory {
   SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m, const RigidTransform& reference_from_earlier,
                 uint32_t phase);
 
+  /// Whether it predicts enough that CoarsePass need not find the surface by itself.
+  bool predictsMuch() const { return predicts_much_; }
+
   /// Sets the estimate in the tiles in which the prediction is believed, with a score that every peak of the
   /// refinement replaces, and returns the other tiles, whose planes must be swept. `coarse` is the estimate
   /// of CoarsePass: where it is confident and contradicts the prediction, its surface is taken.
@@ -26,10 +29,12 @@ class SurfaceMemory {
                               SurfaceEstimate* estimate) const;
 
  private:
-  bool applyToTile(const SurfaceEstimate& coarse, const cv::Rect& tile, SurfaceEstimate* estimate) const;
+  bool isBelieved(const SurfaceEstimate& coarse, const cv::Rect& tile) const;
+  void setTile(const SurfaceEstimate& coarse, const cv::Rect& tile, SurfaceEstimate* estimate) const;
 
   const uint32_t phase_;
   cv::Mat inverse_range_;  // CV_32FC1, NaN where nothing is predicted
+  bool predicts_much_ = false;
 };
 
 }  // namespace vcharge
