@@ -92,7 +92,7 @@ class PlaneSweep {
 
  private:
   SurfaceEstimate sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
-                              const std::vector<cv::Rect>& large_tiles, const SurfaceMemory* memory) const;
+                              const SurfaceMemory* memory) const;
   RangeMap sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details,
                  const SurfaceMemory* memory) const;
 

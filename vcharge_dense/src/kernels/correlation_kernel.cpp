@@ -324,7 +324,7 @@ int64_t samplingTime_ns() {
   row.image = image.data();
   row.pitch = pitch;
   row.strip = kStrip;
-  row.scale = SampleScale::forWindow(7);
+  row.scale = SampleScale::forWindow(kMatchingWindow_px);
   const Sampler<kLoadEach> sample(row);
   const VI pixel = hn::Set(di, 1 << kPositionBits);
   int64_t shortest = std::numeric_limits<int64_t>::max();
@@ -333,8 +333,7 @@ int64_t samplingTime_ns() {
     const auto start = std::chrono::steady_clock::now();
     VI v = hn::Zero(di);
     for (int y = 0; y < kRows; ++y) {
-      VI u = hn::Iota(di, 0);
-      u = hn::Mul(u, hn::Set(di, kStrip << kPositionBits));
+      VI u = hn::Mul(hn::Iota(di, 0), hn::Set(di, kStrip << kPositionBits));
       for (int s = 0; s < kStrip; ++s) {
         sum = hn::Add(sum, sample(u, v));
         u = hn::Add(u, pixel);
@@ -351,9 +350,10 @@ int64_t samplingTime_ns() {
 }  // namespace
 
 void fillCorrelationKernels(SweepKernels* kernels) {
-  // Both give the same; which one is faster depends on the processor.
   static const bool load_each = samplingTime_ns<true>() < samplingTime_ns<false>();
-  kernels->correlate = load_each ? &correlateTarget<true> : &correlateTarget<false>;
+  kernels->correlateByGathers = &correlateTarget<false>;
+  kernels->correlateByLoads = &correlateTarget<true>;
+  kernels->correlate = load_each ? kernels->correlateByLoads : kernels->correlateByGathers;
 }
 
 }  // namespace HWY_NAMESPACE

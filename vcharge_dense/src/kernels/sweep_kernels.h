@@ -208,7 +208,9 @@ struct SweepKernels {
   void (*makeCells)(const float* const* u_rows, const float* const* v_rows, int nodes, int spacing,
                     float* cells);
   NodeDifferences (*nodeDifferences)(const float* u, const float* v, int node_rows, int nodes);
-  void (*correlate)(const CorrelationRow& row);
+  void (*correlate)(const CorrelationRow& row);  ///< the faster one of the next two, which give the same
+  void (*correlateByGathers)(const CorrelationRow& row);
+  void (*correlateByLoads)(const CorrelationRow& row);
   void (*vote)(const VoteRow& row);
   /// `scores`: [hypothesis][pixel], `stride` elements from one hypothesis to the next.
   void (*findPeaks)(const int16_t* scores, size_t stride, int num_hypotheses, size_t num_pixels,

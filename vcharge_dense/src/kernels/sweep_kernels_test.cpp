@@ -264,12 +264,28 @@ TEST(SweepKernelsTest, StepsFollowTheProjection) {
       EXPECT_EQ(u[7], 0) << "a point without an inverse range";
     }
     EXPECT_GT(seen, 30 * (2 * kReach + 1));
-    // Farther than a table can tell.
-    kernels.makeSteps(projection, rays, 20.0f, 1, count, steps);
-    kernels.walkSteps(steps, 1, count, u.data(), v.data());
+    // Steps that are longer than a table can tell are unseen.
+    constexpr float kLong = 80.0f;
+    AlignedArray<int32_t> before_u, before_v;
+    before_u.resize(count);
+    before_v.resize(count);
+    RayRow before = rays, after = rays;
+    before.offset = -kLong;
+    after.offset = kLong;
+    kernels.projectFixed(projection, before, count, before_u.data(), before_v.data());
+    kernels.projectFixed(projection, after, count, exact_u.data(), exact_v.data());
+    kernels.makeSteps(projection, rays, kLong, 1, count, steps);
+    kernels.walkSteps(steps, 0, count, u.data(), v.data());
+    int too_long = 0;
     for (size_t i = 0; i < count; ++i) {
-      EXPECT_EQ(u[i] == 0, v[i] == 0);
+      const bool is_visible = (before_u[i] != 0 || before_v[i] != 0) && (exact_u[i] != 0 || exact_v[i] != 0);
+      if (is_visible && std::abs(exact_u[i] - before_u[i]) > 2 * 16.1 * (1 << kPositionBits)) {
+        ++too_long;
+        EXPECT_EQ(u[i], 0) << "point " << i;
+        EXPECT_EQ(v[i], 0) << "point " << i;
+      }
     }
+    EXPECT_GT(too_long, 5);
   });
 }
 

@@ -81,7 +81,7 @@ CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::option
   PlaneSweepOptions options = fine_->options();
   options.num_planes = std::max(3, (options.num_planes + 1) / 2);
   options.num_ground_planes = std::max(3, (options.num_ground_planes + 1) / 2);
-  options.warp_tolerance_px *= 2.0;
+  options.warp_tolerance_px *= 2.0;  // its surface only guides the main sweep
   level_ = halfLevel(*fine_, options, ground_in_camera);
 }
 

@@ -40,6 +40,13 @@ struct Level {
         tiles(makeTiles(kSize, TileSize::kSmall)) {}
 
   SweepInput input() const { return inputOf(*level, sequence); }
+  SweepPixels halfPixels() const {
+    SweepPixels pixels{sequence.reference.pixels, {}};
+    for (const SweepImage& image : sequence.neighbours) {
+      pixels.neighbours.push_back(image.pixels);
+    }
+    return halved(pixels);
+  }
 };
 
 bool sameBytes(const cv::Mat& a, const cv::Mat& b) {
@@ -89,6 +96,26 @@ TEST(CoarsePassTest, PlanesLeftOutDoNotChangeTheScoresOfOthers) {
       }
     }
     EXPECT_GT(inside, 0);
+  });
+}
+
+TEST(TileScorerTest, GathersAndLoadsGiveTheSame) {
+  const Level setup;
+  onEveryTarget([&] {
+    SweepInput input = setup.input();
+    TileScores scores[2];
+    for (const bool by_loads : {false, true}) {
+      input.kernels.correlate = by_loads ? input.kernels.correlateByLoads : input.kernels.correlateByGathers;
+      TileScorer scorer;
+      scorer.setTile(input, setup.tiles[setup.tiles.size() / 2]);
+      scorer.score(setup.level->planes().front(), &scores[by_loads ? 1 : 0]);
+    }
+    ASSERT_GT(scores[0].scores.size(), 0U);
+    ASSERT_EQ(scores[0].scores.size(), scores[1].scores.size());
+    EXPECT_EQ(std::memcmp(scores[0].scores.data(), scores[1].scores.data(),
+                          scores[0].scores.size() * sizeof(int16_t)),
+              0);
+    EXPECT_EQ(scores[0].voter_bits, scores[1].voter_bits);
   });
 }
 
@@ -163,11 +190,7 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  SweepPixels images{setup.sequence.reference.pixels, {}};
-  for (const SweepImage& image : setup.sequence.neighbours) {
-    images.neighbours.push_back(image.pixels);
-  }
-  const SurfaceEstimate found = coarse.sweep(input, halved(images), false);
+  const SurfaceEstimate found = coarse.sweep(input, setup.halfPixels(), false);
   EXPECT_EQ(found.score.size(), cv::Size(kSize.width / 2, kSize.height / 2));
   const std::vector<TilePlanes> choice = coarse.choosePlanes(found, setup.tiles);
   const Hypotheses& planes = setup.level->planes().front();
@@ -200,11 +223,7 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
 TEST(CoarsePassTest, HalfOfTheImagesFindASurfaceThatIsPredicted) {
   const Level setup;
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  SweepPixels images{setup.sequence.reference.pixels, {}};
-  for (const SweepImage& image : setup.sequence.neighbours) {
-    images.neighbours.push_back(image.pixels);
-  }
-  const SweepPixels half = halved(images);
+  const SweepPixels half = setup.halfPixels();
   const SurfaceEstimate with_all = coarse.sweep(setup.input(), half, false);
   const SurfaceEstimate with_half = coarse.sweep(setup.input(), half, true);
   int confident = 0, agree = 0, voters = 0;

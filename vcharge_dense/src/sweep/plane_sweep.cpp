@@ -87,15 +87,15 @@ const std::vector<PlaneFamily>& PlaneSweep::families() const {
 }
 
 SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
-                                        const std::vector<cv::Rect>& large_tiles,
                                         const SurfaceMemory* memory) const {
+  const cv::Size size = level_->validMask().size();
   if (!coarse_) {
-    return level_->sweepPlanes(input, large_tiles, {});
+    return level_->sweepPlanes(input, makeTiles(size), {});
   }
   const SurfaceEstimate coarse =
       coarse_->sweep(input, half_pixels, memory != nullptr && memory->predictsMuch());
-  std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kSmall);
-  SurfaceEstimate estimate(level_->validMask().size());
+  std::vector<cv::Rect> tiles = makeTiles(size, TileSize::kSmall);
+  SurfaceEstimate estimate(size);
   if (memory != nullptr) {
     tiles = memory->apply(coarse, tiles, &estimate);
   }
@@ -138,12 +138,10 @@ RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, S
   const cv::Size size = level_->validMask().size();
   const bool has_neighbours = !input.neighbours.empty();
   SweepPixels half_pixels;
-  std::vector<cv::Rect> tiles;
   SurfaceEstimate estimate(size);
   if (has_neighbours) {
     half_pixels = coarse_ || half_ ? halved(pixels) : SweepPixels();
-    tiles = makeTiles(size);
-    estimate = sweepPlanes(input, half_pixels, tiles, memory);
+    estimate = sweepPlanes(input, half_pixels, memory);
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options().num_refinement_steps > 0) {

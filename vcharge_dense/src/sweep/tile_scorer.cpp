@@ -22,19 +22,14 @@ void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& la
   std::vector<From> line(static_cast<size_t>(layout.columns()));
   const int begin = std::clamp(-origin.x, 0, layout.columns());
   const int end = std::clamp(image.cols - origin.x, begin, layout.columns());
-  const bool is_inside = begin == 0 && end == layout.columns();
   for (int row = 0; row < layout.rows; ++row) {
     const int y = origin.y + row;
-    const bool has_row = y >= 0 && y < image.rows;
-    const From* first = is_inside && has_row ? image.ptr<From>(y) + origin.x : line.data();
-    if (first == line.data()) {
-      std::fill(line.begin(), line.end(), outside);
-      if (has_row) {
-        std::copy_n(image.ptr<From>(y) + origin.x + begin, end - begin, line.begin() + begin);
-      }
+    std::fill(line.begin(), line.end(), outside);
+    if (y >= 0 && y < image.rows) {
+      std::copy_n(image.ptr<From>(y) + origin.x + begin, end - begin, line.begin() + begin);
     }
     for (int s = 0; s < layout.strip; ++s) {
-      const From* from = first + s;
+      const From* from = line.data() + s;
       for (int lane = 0; lane < layout.lanes; ++lane) {
         *to++ = static_cast<To>(from[lane * layout.strip]);
       }
@@ -330,9 +325,11 @@ void TileScorer::score(const Hypotheses& hypotheses, const std::vector<int>& slo
     array->resize(size);
   }
   loadSurface(hypotheses);
-  makeSteps(hypotheses);
-  for (size_t slot = 0; slot < slots.size() && first_row_ < end_row_; ++slot) {
-    scoreSlot(hypotheses, slot, result);
+  if (first_row_ < end_row_) {
+    makeSteps(hypotheses);
+    for (size_t slot = 0; slot < slots.size(); ++slot) {
+      scoreSlot(hypotheses, slot, result);
+    }
   }
   const size_t first = static_cast<size_t>(first_row_) * row_size;
   const size_t end = static_cast<size_t>(end_row_) * row_size;
