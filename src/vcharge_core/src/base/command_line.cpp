@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "vcharge_core/base/memory_reuse.h"
 #include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
@@ -144,6 +145,7 @@ void addShowOptions(CommandLine* command_line, bool* show_options) {
 }
 
 int runTool(CommandLine* command_line, int argc, char** argv, const std::function<void()>& run) {
+  keepFreedMemory();
   CLI::App& app = *command_line->app_;
   const std::string tool = std::filesystem::path(argv[0]).filename().string();
   if (std::find(argv, argv + argc, std::string_view("--show-options")) != argv + argc) {

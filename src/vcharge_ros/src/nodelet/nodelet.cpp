@@ -3,6 +3,7 @@
 #include <nodelet/detail/callback_queue.h>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/base/memory_reuse.h"
 #include "vcharge_core/base/text_format.h"
 
 namespace vcharge {
@@ -23,6 +24,7 @@ Nodelet::~Nodelet() {
 }
 
 void Nodelet::onInit() {
+  keepFreedMemory();
   single_threaded_queue_ = keep(&getSTCallbackQueue());
   multi_threaded_queue_ = keep(&getMTCallbackQueue());
   try {
