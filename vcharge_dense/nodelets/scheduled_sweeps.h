@@ -21,7 +21,7 @@
 
 namespace vcharge {
 
-/// Sweeps the tasks of a RangeMapper in a thread of its own, those of the newest stamp first, for the cameras
+/// Sweeps the tasks of a RangeMapper in threads of its own, those of the newest stamp first, for the cameras
 /// that a schedule chooses, and publishes the range maps. Before those of a stamp, /dense/scheduled announces
 /// their cameras. In a replay without loss, all tasks are swept at once in the caller's thread.
 class ScheduledSweeps {
@@ -71,14 +71,11 @@ class ScheduledSweeps {
       announcement.cameras.push_back(rig_->cameras[camera].name);
     }
     scheduled_.publish(announcement);
-    for (const size_t camera : chosen) {
+    schedule_->runTurns(chosen, [&](size_t camera) {
       const auto task = std::find_if(instant.begin(), instant.end(),
                                      [camera](const RangeTask& each) { return each.camera_index == camera; });
-      schedule_->run([&] {
-        publishers_.at(camera).publish(mapper_->sweep(*task));
-        return 1;
-      });
-    }
+      publishers_.at(camera).publish(mapper_->sweep(*task));
+    });
   }
 
   const std::shared_ptr<const CameraRig> rig_;

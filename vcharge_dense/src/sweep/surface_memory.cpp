@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 
 #include "kernels/pooled_mat.h"
-#include "kernels/wide_loops.h"
 #include "sweep/coarse_pass.h"
+#include "vcharge_core/base/wide_loops.h"
 
 namespace vcharge {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "kernels/parallel_rows.h"
 #include "kernels/pooled_mat.h"
-#include "kernels/wide_loops.h"
+#include "vcharge_core/base/wide_loops.h"
 
 namespace vcharge {
 namespace {

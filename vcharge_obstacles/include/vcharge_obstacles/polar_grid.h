@@ -45,7 +45,9 @@ class PolarGrid {
 
   /// Bin of an inverse range; outside [0, numBins()) if it is too near or too far.
   int binOfInverse(float inverse_range_per_m) const {
-    return static_cast<int>(std::floor((inverse_range_per_m - min_inverse_) * bins_per_inverse_));
+    const float bin = (inverse_range_per_m - min_inverse_) * bins_per_inverse_;
+    const auto towards_zero = static_cast<int>(bin);
+    return towards_zero - (bin < static_cast<float>(towards_zero) ? 1 : 0);
   }
   double range_m(int bin) const {
     return 1.0 / (min_inverse_ + (static_cast<double>(bin) + 0.5) / bins_per_inverse_);

@@ -45,18 +45,27 @@ class StripSum {
   explicit StripSum(const PolarGrid& grid)
       : grid_(grid), difference_(static_cast<size_t>(grid.numRays()) * (grid.numBins() + 1), 0.0F) {}
 
-  void add(int ray, float from_inverse, float to_inverse, float weight) {
+  /// Cells of a ray, the same in all sums of a grid: from `begin` up to but not including `end`.
+  struct Strip {
+    size_t begin = 0, end = 0;
+  };
+  Strip stripOf(int ray, float from_inverse, float to_inverse) const {
     // The strip covers the bins whose middles lie in it.
     int from = grid_.binOfInverse(from_inverse + half_);
-    int to = grid_.binOfInverse(to_inverse + half_) - 1;
+    int to = grid_.binOfInverse(to_inverse + half_);
     from = from < 0 ? 0 : from;
-    to = to >= grid_.numBins() ? grid_.numBins() - 1 : to;
-    if (from > to) {
-      return;
+    to = to > grid_.numBins() ? grid_.numBins() : to;
+    const size_t first = static_cast<size_t>(ray) * (grid_.numBins() + 1);
+    return from < to ? Strip{first + from, first + to} : Strip{};
+  }
+  void add(Strip strip, float weight) {
+    if (strip.begin < strip.end) {
+      difference_[strip.begin] += weight;
+      difference_[strip.end] -= weight;
     }
-    float* row = &difference_[static_cast<size_t>(ray) * (grid_.numBins() + 1)];
-    row[from] += weight;
-    row[to + 1] -= weight;
+  }
+  void add(int ray, float from_inverse, float to_inverse, float weight) {
+    add(stripOf(ray, from_inverse, to_inverse), weight);
   }
   /// Sums by PolarGrid::index.
   std::vector<float> finish() const;

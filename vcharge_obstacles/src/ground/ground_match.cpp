@@ -8,6 +8,7 @@
 
 #include "ground/plane_fit.h"
 #include "vcharge_core/base/quantile.h"
+#include "vcharge_core/base/wide_loops.h"
 
 namespace vcharge {
 namespace {
@@ -30,6 +31,20 @@ constexpr size_t kExposureStep = 8;
 constexpr float kMinBrightness = 8.0F;
 // The light on the ground is alike over windows of this side.
 constexpr int kLight_px = 21;
+
+/// Directions of rays, and the lengths of their horizontal parts.
+struct RayColumns {
+  const float *x, *y, *z, *horizontal;
+};
+
+/// Inverse horizontal ranges at which rays meet a plane below the camera.
+VCHARGE_WIDE_LOOPS void meetPlane(const RayColumns& rays, size_t count, float slope_x, float slope_y,
+                                  float height_m, float* inverse_per_m) {
+  const float *x = rays.x, *y = rays.y, *z = rays.z, *horizontal = rays.horizontal;
+  for (size_t i = 0; i < count; ++i) {
+    inverse_per_m[i] = (slope_x * x[i] + slope_y * y[i] - z[i]) / (height_m * horizontal[i]);
+  }
+}
 
 /// CV_8UC1: not 0 where the windows of a warped image are known.
 cv::Mat knownWindows(const WarpedImage& warped) {
@@ -80,47 +95,53 @@ GroundMatch::GroundMatch(const WorkingCamera& camera, const RigidTransform& vehi
 
 /// Pixels of the newer image that matter, and the points of the ground that they show.
 struct GroundMatch::Band {
-  struct Pixel {
-    size_t ray;
-    float inverse;  // of the horizontal range to the ground
-  };
   cv::Rect rows;
-  float height_m = 0.0F;  // above the ground
-  std::vector<Pixel> pixels;
-  PixelPoints ground;  // of the inner ones
+  std::vector<size_t> rays;  // by row
+  PixelPoints ground;        // of the inner ones
 };
 
-GroundMatch::Band GroundMatch::pixelsIn(const GroundPlane& ground, double near_m, double far_m) const {
+GroundMatch::Ground GroundMatch::meet(const GroundPlane& plane) const {
   const Eigen::Vector3f camera = vehicle_from_camera_.translation().cast<float>();
-  const auto slope_x = static_cast<float>(ground.slope.x());
-  const auto slope_y = static_cast<float>(ground.slope.y());
+  const auto slope_x = static_cast<float>(plane.slope.x());
+  const auto slope_y = static_cast<float>(plane.slope.y());
+  Ground ground;
+  ground.height_m =
+      camera.z() - static_cast<float>(plane.offset_m) - slope_x * camera.x() - slope_y * camera.y();
+  ground.inverse_per_m.resize(rays_.size());
+  meetPlane({rays_.x.data(), rays_.y.data(), rays_.z.data(), rays_.horizontal.data()}, rays_.size(), slope_x,
+            slope_y, ground.height_m, ground.inverse_per_m.data());
+  return ground;
+}
+
+GroundMatch::Band GroundMatch::pixelsIn(const Ground& ground, double near_m, double far_m) const {
+  const auto largest = static_cast<float>(1.0 / near_m) / (1.0F - kBandMargin);
+  const auto least = static_cast<float>(1.0 / far_m) / (1.0F + kBandMargin);
   Band band;
-  band.height_m =
-      camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
-  const auto near = static_cast<float>(near_m) * (1.0F - kBandMargin);
-  const auto far = static_cast<float>(far_m) * (1.0F + kBandMargin);
-  band.pixels.reserve(rays_.size());
-  band.ground.reserve(rays_.size());
+  band.rays.reserve(rays_.size());
+  size_t num_inner = 0;
   for (size_t i = 0; i < rays_.size(); ++i) {
-    const float fall = slope_x * rays_.x[i] + slope_y * rays_.y[i] - rays_.z[i];
-    const float across = band.height_m * rays_.horizontal[i];
-    if (fall * far > across && fall * near < across) {
-      band.pixels.push_back({i, fall / across});
-      if (warp_.isValid(rays_.pixel[i])) {
-        band.ground.add(rays_.pixel[i], rays_.x[i], rays_.y[i], rays_.z[i], fall / band.height_m);
-      }
+    if (ground.inverse_per_m[i] > least && ground.inverse_per_m[i] < largest) {
+      band.rays.push_back(i);
+      num_inner += warp_.isValid(rays_.pixel[i]) ? 1 : 0;
     }
   }
-  if (!band.pixels.empty()) {  // by row
-    const int top = rays_.pixel[band.pixels.front().ray] / size_.width;
-    const int bottom = rays_.pixel[band.pixels.back().ray] / size_.width + 1;
+  band.ground.reserve(num_inner);
+  for (const size_t i : band.rays) {
+    if (warp_.isValid(rays_.pixel[i])) {
+      band.ground.add(rays_.pixel[i], rays_.x[i], rays_.y[i], rays_.z[i],
+                      ground.inverse_per_m[i] * rays_.horizontal[i]);
+    }
+  }
+  if (!band.rays.empty()) {
+    const int top = rays_.pixel[band.rays.front()] / size_.width;
+    const int bottom = rays_.pixel[band.rays.back()] / size_.width + 1;
     band.rows = cv::Rect(0, top, size_.width, bottom - top);
   }
   return band;
 }
 
 std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const GroundView& before,
-                                               const GroundPlane& ground, double near_m, double far_m,
+                                               const Ground& ground, double near_m, double far_m,
                                                Wanted wanted) const {
   const Band band = pixelsIn(ground, near_m, far_m);
   if (band.rows.empty()) {
@@ -138,8 +159,8 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   const int first_pixel = band.rows.y * size_.width;
   // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
   std::vector<double> ratios;
-  for (size_t i = 0; i < band.pixels.size(); i += kExposureStep) {
-    const int at = rays_.pixel[band.pixels[i].ray], in_rows = at - first_pixel;
+  for (size_t i = 0; i < band.rays.size(); i += kExposureStep) {
+    const int at = rays_.pixel[band.rays[i]], in_rows = at - first_pixel;
     const float a = now.smooth.data[at], b = on_ground.data[in_rows];
     if (knows_ground.data[in_rows] != 0 && std::min(a, b) >= kMinBrightness) {
       ratios.push_back(a / b);
@@ -152,18 +173,21 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   const cv::Mat local_gain = localGain(here, on_ground, knows_ground);
   cv::Mat keeps_texture, fit;
   if (wanted == Wanted::kAll) {
-    const WarpedImage raised = warpBefore(band.height_m / (band.height_m - static_cast<float>(kRaised_m)));
+    const WarpedImage raised =
+        warpBefore(ground.height_m / (ground.height_m - static_cast<float>(kRaised_m)));
     fit = fitPlanes(here, on_ground, raised.image, knownWindows(raised), &keeps_texture);
   } else {
     fit = cv::Mat(here.size(), CV_8UC1, cv::Scalar(PlaneFit::kUndecided));
     keeps_texture = keepsTexture(here, on_ground);
   }
   std::vector<MatchedPixel> result;
-  result.reserve(band.pixels.size());
+  result.reserve(band.rays.size());
   const auto near_inverse = static_cast<float>(1.0 / near_m), far_inverse = static_cast<float>(1.0 / far_m);
-  for (const Band::Pixel& pixel : band.pixels) {
-    const int at = rays_.pixel[pixel.ray], in_rows = at - first_pixel;
-    if (pixel.inverse > near_inverse || pixel.inverse < far_inverse || knows_ground.data[in_rows] == 0) {
+  const float to_low = ground.height_m / (ground.height_m - kLow_m);
+  for (const size_t ray : band.rays) {
+    const float inverse = ground.inverse_per_m[ray];
+    const int at = rays_.pixel[ray], in_rows = at - first_pixel;
+    if (inverse > near_inverse || inverse < far_inverse || knows_ground.data[in_rows] == 0) {
       continue;
     }
     const int nearest = warped.nearest.ptr<int32_t>()[in_rows];
@@ -174,11 +198,9 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
       return brightness < factor * lowest - tolerance || brightness > factor * highest + tolerance;
     };
     const bool has_texture = keeps_texture.data[in_rows] != 0;
-    const bool is_other_light = has_texture && !differsWith(local_gain.ptr<float>()[in_rows]);
-    const bool differs = differsWith(gain) && !is_other_light;
-    result.push_back({pixel.ray, pixel.inverse, pixel.inverse * band.height_m / (band.height_m - kLow_m),
-                      fit.data[in_rows] == PlaneFit::kGround, fit.data[in_rows] == PlaneFit::kOther, differs,
-                      has_texture});
+    const bool differs = differsWith(gain) && (!has_texture || differsWith(local_gain.ptr<float>()[in_rows]));
+    result.push_back({ray, inverse, inverse * to_low, fit.data[in_rows] == PlaneFit::kGround,
+                      fit.data[in_rows] == PlaneFit::kOther, differs, has_texture});
   }
   return result;
 }

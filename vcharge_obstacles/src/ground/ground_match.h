@@ -51,15 +51,20 @@ class GroundMatch {
   GroundMatch(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera, const PixelRays& rays,
               double min_difference);
 
+  /// Where the rays of the pixels meet the ground.
+  struct Ground {
+    float height_m = 0.0F;             ///< of the camera above it
+    std::vector<float> inverse_per_m;  ///< by ray: inverse horizontal range; not positive above the horizon
+  };
+  Ground meet(const GroundPlane& plane) const;
   /// Pixels whose ground lies between two ranges from the camera; none if the exposures cannot be compared.
-  std::vector<MatchedPixel> compare(const GroundView& now, const GroundView& before,
-                                    const GroundPlane& ground, double near_m, double far_m,
-                                    Wanted wanted) const;
+  std::vector<MatchedPixel> compare(const GroundView& now, const GroundView& before, const Ground& ground,
+                                    double near_m, double far_m, Wanted wanted) const;
 
  private:
   struct Band;
 
-  Band pixelsIn(const GroundPlane& ground, double near_m, double far_m) const;
+  Band pixelsIn(const Ground& ground, double near_m, double far_m) const;
 
   const RigidTransform vehicle_from_camera_;
   const cv::Size size_;

@@ -68,8 +68,8 @@ struct GroundWatch::Implementation {
   struct Fractions {
     std::vector<float> changed, same;
   };
-  Fractions compareWith(const GroundView& before, const GroundPlane& ground) const;
-  std::vector<float> groundPixels(const GroundPlane& ground) const;
+  Fractions compareWith(const GroundView& before, const GroundMatch::Ground& ground) const;
+  std::vector<float> groundPixels(const GroundMatch::Ground& ground) const;
 
   const double max_distance_m;
   const PolarGrid grid;
@@ -114,7 +114,7 @@ const GroundView* GroundWatch::Implementation::viewAt(double baseline_m) const {
 }
 
 GroundWatch::Implementation::Fractions GroundWatch::Implementation::compareWith(
-    const GroundView& before, const GroundPlane& ground) const {
+    const GroundView& before, const GroundMatch::Ground& ground) const {
   const std::vector<MatchedPixel> pixels =
       match.compare(views.back(), before, ground, kNearest_m, max_distance_m, GroundMatch::Wanted::kChanges);
   if (pixels.empty()) {
@@ -122,11 +122,13 @@ GroundWatch::Implementation::Fractions GroundWatch::Implementation::compareWith(
   }
   StripSum changed(grid), same(grid), compared(grid);
   for (const MatchedPixel& pixel : pixels) {
-    compared.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
+    const StripSum::Strip strip =
+        compared.stripOf(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse);
+    compared.add(strip, 1.0F);
     if (pixel.is_changed) {
-      changed.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
+      changed.add(strip, 1.0F);
     } else if (pixel.keeps_texture) {
-      same.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
+      same.add(strip, 1.0F);
     }
   }
   Fractions fractions{changed.finish(), same.finish()};
@@ -138,7 +140,7 @@ GroundWatch::Implementation::Fractions GroundWatch::Implementation::compareWith(
   return fractions;
 }
 
-std::vector<float> GroundWatch::Implementation::groundPixels(const GroundPlane& ground) const {
+std::vector<float> GroundWatch::Implementation::groundPixels(const GroundMatch::Ground& ground) const {
   StripSum shown(grid), other(grid), compared(grid);
   double near_m = kNearest_m;
   for (const Band& band : kBands) {
@@ -147,12 +149,13 @@ std::vector<float> GroundWatch::Implementation::groundPixels(const GroundPlane& 
     if (before != nullptr && far_m > near_m) {
       for (const MatchedPixel& pixel :
            match.compare(views.back(), *before, ground, near_m, far_m, GroundMatch::Wanted::kAll)) {
-        const int ray = rays.polar_ray[pixel.ray];
-        compared.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+        const StripSum::Strip strip =
+            compared.stripOf(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse);
+        compared.add(strip, 1.0F);
         if (pixel.is_ground) {
-          shown.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+          shown.add(strip, 1.0F);
         } else if (pixel.is_other || pixel.is_changed) {
-          other.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+          other.add(strip, 1.0F);
         }
       }
     }
@@ -187,12 +190,13 @@ GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, con
       RigidTransform::planar(fixed_from_vehicle.translation().x(), fixed_from_vehicle.translation().y(),
                              yawOfRotation(fixed_from_vehicle.rotation()));
   self.addView(stamp, image, planar * levelFromBody(ground));
+  const GroundMatch::Ground rays_to_ground = self.match.meet(ground);
   GroundAppearance appearance;
   if (const GroundView* before = self.viewBefore(stamp)) {
-    appearance.changed_fraction = self.compareWith(*before, ground).changed;
+    appearance.changed_fraction = self.compareWith(*before, rays_to_ground).changed;
   }
   if (ground.state == GroundState::kMeasured) {
-    appearance.ground_pixels = self.groundPixels(ground);
+    appearance.ground_pixels = self.groundPixels(rays_to_ground);
   }
   return appearance;
 }
@@ -200,7 +204,7 @@ GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, con
 StandingAppearance GroundWatch::compareStanding(Timestamp stamp, const cv::Mat& image) {
   Implementation& self = *implementation_;
   self.addView(stamp, image, RigidTransform());
-  const GroundPlane level;
+  const GroundMatch::Ground level = self.match.meet(GroundPlane());
   StandingAppearance appearance;
   const auto addChanges = [&](const std::vector<float>& changed) {
     appearance.changed_fraction.resize(changed.empty() ? appearance.changed_fraction.size() : changed.size());

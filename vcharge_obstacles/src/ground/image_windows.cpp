@@ -4,35 +4,73 @@
 #include <cmath>
 #include <utility>
 
+#include "vcharge_core/base/wide_loops.h"
+
 namespace vcharge {
 namespace {
 
-void addValues(const uint8_t* a, int sign, int columns, int32_t* sums) {
+VCHARGE_WIDE_LOOPS void addValues(const uint8_t* a, int sign, int columns, int32_t* sums) {
   for (int x = 0; x < columns; ++x) {
     sums[x] += sign * a[x];
   }
 }
 
-void addProducts(const uint8_t* a, const uint8_t* b, int columns, int32_t* sums) {
+VCHARGE_WIDE_LOOPS void addProducts(const uint8_t* a, const uint8_t* b, int columns, int32_t* sums) {
   for (int x = 0; x < columns; ++x) {
     sums[x] += a[x] * b[x];
   }
 }
 
-void subtractProducts(const uint8_t* a, const uint8_t* b, int columns, int32_t* sums) {
+VCHARGE_WIDE_LOOPS void subtractProducts(const uint8_t* a, const uint8_t* b, int columns, int32_t* sums) {
   for (int x = 0; x < columns; ++x) {
     sums[x] -= a[x] * b[x];
   }
 }
 
 template <int kSide>
-void slideWindows(const int32_t* of_column, int columns, int32_t* of_window) {
+[[gnu::always_inline]] inline void slideWindows(const int32_t* of_column, int columns, int32_t* of_window) {
   for (int x = 0; x < columns; ++x) {
     int32_t sum = of_column[x];
     for (int i = 1; i < kSide; ++i) {
       sum += of_column[x + i];
     }
     of_window[x] = sum;
+  }
+}
+
+VCHARGE_WIDE_LOOPS void slideWindowsOf5(const int32_t* of_column, int columns, int32_t* of_window) {
+  slideWindows<5>(of_column, columns, of_window);
+}
+
+VCHARGE_WIDE_LOOPS void slideWindowsOf9(const int32_t* of_column, int columns, int32_t* of_window) {
+  slideWindows<9>(of_column, columns, of_window);
+}
+
+VCHARGE_WIDE_LOOPS void findMoments(const int32_t* count, const int32_t* sums, const int32_t* squares,
+                                    int columns, float* mean, float* variance) {
+  for (int x = 0; x < columns; ++x) {
+    const float part = 1.0F / static_cast<float>(count[x]);
+    mean[x] = static_cast<float>(sums[x]) * part;
+    variance[x] = static_cast<float>(count[x] * squares[x] - sums[x] * sums[x]) * (part * part);
+  }
+}
+
+/// Sums and variances of the windows of one image.
+struct WindowMoments {
+  const int32_t* sums;
+  const float* variance;
+};
+
+VCHARGE_WIDE_LOOPS void correlate(const int32_t* count, const int32_t* products, const WindowMoments& here,
+                                  const WindowMoments& there, int columns, float* correlation) {
+  const int32_t *here_sums = here.sums, *there_sums = there.sums;
+  const float *here_variance = here.variance, *there_variance = there.variance;
+  for (int x = 0; x < columns; ++x) {
+    const int32_t covariance = count[x] * products[x] - here_sums[x] * there_sums[x];
+    const float a = here_variance[x] > 1.0F ? here_variance[x] : 1.0F;
+    const float b = there_variance[x] > 1.0F ? there_variance[x] : 1.0F;
+    const auto squared_count = static_cast<float>(count[x] * count[x]);
+    correlation[x] = static_cast<float>(covariance) / (squared_count * std::sqrt(a * b));
   }
 }
 
@@ -61,9 +99,9 @@ void WindowSums::add(Row entering, Row leaving) {
 void WindowSums::slide() {
   switch (half_px_) {  // loops of a known length vectorize
     case 2:
-      return slideWindows<5>(of_column_.data(), columns_, of_window_.data());
+      return slideWindowsOf5(of_column_.data(), columns_, of_window_.data());
     case 4:
-      return slideWindows<9>(of_column_.data(), columns_, of_window_.data());
+      return slideWindowsOf9(of_column_.data(), columns_, of_window_.data());
     default:
       for (int x = 0; x < columns_; ++x) {
         int32_t sum = 0;
@@ -114,17 +152,8 @@ void ImageWindows::addRow(int entering, int leaving) {
 void ImageWindows::setMoments(Moments* moments) const {
   moments->sums.slide();
   moments->squares.slide();
-  const int32_t* count = count_.data();
-  const int32_t* sums = moments->sums.data();
-  const int32_t* squares = moments->squares.data();
-  float* mean = moments->mean.data();
-  float* variance = moments->variance.data();
-  const int columns = now_.cols;
-  for (int x = 0; x < columns; ++x) {
-    const float part = 1.0F / static_cast<float>(count[x]);
-    mean[x] = static_cast<float>(sums[x]) * part;
-    variance[x] = static_cast<float>(count[x] * squares[x] - sums[x] * sums[x]) * (part * part);
-  }
+  findMoments(count_.data(), moments->sums.data(), moments->squares.data(), now_.cols, moments->mean.data(),
+              moments->variance.data());
 }
 
 void ImageWindows::nextRow() {
@@ -141,19 +170,8 @@ void ImageWindows::nextRow() {
   for (size_t i = 0; i < before_.size(); ++i) {
     setMoments(&there_[i]);
     pairs_[i].products.slide();
-    const int32_t* products = pairs_[i].products.data();
-    const int32_t* here_sums = here_.sums.data();
-    const int32_t* there_sums = there_[i].sums.data();
-    const float* here_variance = here_.variance.data();
-    const float* there_variance = there_[i].variance.data();
-    float* correlation = pairs_[i].correlation.data();
-    for (int x = 0; x < columns; ++x) {
-      const int32_t covariance = count[x] * products[x] - here_sums[x] * there_sums[x];
-      const float a = here_variance[x] > 1.0F ? here_variance[x] : 1.0F;
-      const float b = there_variance[x] > 1.0F ? there_variance[x] : 1.0F;
-      const auto squared_count = static_cast<float>(count[x] * count[x]);
-      correlation[x] = static_cast<float>(covariance) / (squared_count * std::sqrt(a * b));
-    }
+    correlate(count_.data(), pairs_[i].products.data(), {here_.sums.data(), here_.variance.data()},
+              {there_[i].sums.data(), there_[i].variance.data()}, columns, pairs_[i].correlation.data());
   }
 }
 

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "vcharge_core/base/wide_loops.h"
+
 namespace vcharge {
 namespace {
 
@@ -19,8 +21,8 @@ struct Projection {
 };
 
 /// Pixels of points; (-1, -1) too far off the axis.
-void project(const Projection& to, const PixelPoints& points, size_t first, size_t count, float* u,
-             float* v) {
+VCHARGE_WIDE_LOOPS void project(const Projection& to, const PixelPoints& points, size_t first, size_t count,
+                                float* u, float* v) {
   const float* x = points.x.data() + first;
   const float* y = points.y.data() + first;
   const float* z = points.z.data() + first;

@@ -83,15 +83,18 @@ double CameraSchedule::weightOf(const Camera& camera, const Eigen::Vector3d& vel
 /// One turn more may begin as long as time is left: what it overdraws is paid back.
 size_t CameraSchedule::affordableTurns() const {
   size_t turns = 0;
-  double passed_s = turn_passed_s_;
   for (double left_s = credit_s_; left_s > 0.0 && turns < cameras_.size(); left_s -= turn_s_) {
-    if (turns > 0 && passed_s > kPartOfStep * step_s_) {
+    const size_t before_it = turns / numThreads();  // in the same thread
+    if (before_it > 0 && static_cast<double>(before_it + 1) * turn_passed_s_ > kPartOfStep * step_s_) {
       break;
     }
     ++turns;
-    passed_s += turn_passed_s_;
   }
   return turns;
+}
+
+size_t CameraSchedule::numThreads() const {
+  return std::max<size_t>(1, static_cast<size_t>(std::ceil(budget_s_per_s_)));
 }
 
 /// Shares the turns out in proportion to the weights (smooth weighted round robin).

@@ -18,8 +18,8 @@
 namespace vcharge {
 
 /// Keeps a nodelet within its parameter ~processor_budget, processor seconds per second: with a limit, its
-/// work runs in the threads that call run(), one each, and CameraSchedule decides which cameras it is done
-/// for. 0: no limit, and as many threads as there are processors. Thread safe.
+/// work runs in the threads that call run(), one each, or in those of runTurns(), and CameraSchedule decides
+/// which cameras it is done for. 0: no limit, and as many threads as there are processors. Thread safe.
 class StageSchedule {
  public:
   StageSchedule(const CameraRig& rig, double budget_s_per_s);
@@ -44,6 +44,9 @@ class StageSchedule {
       }
     });
   }
+  /// run() for each of the chosen cameras, the first ones first, in CameraSchedule::numThreads() threads.
+  /// `work` takes the camera, and is called by several threads at once.
+  void runTurns(const std::vector<size_t>& cameras, const std::function<void(size_t camera)>& work);
   /// Adds budget, use, and the stamps at which a camera, or each camera of the rig, was left out; warns if
   /// that happened lately.
   void describe(size_t camera, DriveMonitor::Report* report) const;

@@ -1,8 +1,11 @@
 #include "vcharge_ros/stage_schedule.h"
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <string>
 
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <opencv2/core/utility.hpp>
 
@@ -58,6 +61,27 @@ void StageSchedule::runAndCount(const std::function<size_t()>& work) {
   const size_t num_turns = one_thread.execute(work);
   const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
   schedule_.spend(threadProcessorTime_s() - begin_s, passed.count(), num_turns);
+}
+
+void StageSchedule::runTurns(const std::vector<size_t>& cameras,
+                             const std::function<void(size_t camera)>& work) {
+  std::atomic<size_t> next = 0;
+  const auto takeTurns = [&](size_t /*thread*/) {
+    for (size_t i = next++; i < cameras.size(); i = next++) {
+      runAndCount([&]() -> size_t {
+        work(cameras[i]);
+        return 1;
+      });
+    }
+  };
+  const size_t num_threads = hasLimit() ? std::min(schedule_.numThreads(), cameras.size()) : 1;
+  if (num_threads < 2) {
+    takeTurns(0);
+    return;
+  }
+  tbb::task_arena(static_cast<int>(num_threads)).execute([&] {
+    tbb::parallel_for(size_t{0}, num_threads, takeTurns);
+  });
 }
 
 void StageSchedule::describe(size_t camera, DriveMonitor::Report* report) const {

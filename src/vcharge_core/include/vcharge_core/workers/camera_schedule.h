@@ -21,7 +21,7 @@ double threadProcessorTime_s();
 /// others have one, and one more if it sees something that moves nearby. Work is measured in processor
 /// seconds per second of the drive, and the budget is held on average: time that was not used is kept for
 /// kReserve_s, and overdrawn time is paid back. There are no more turns at a stamp than end before the next
-/// one, so that results come at every stamp, and soon. Thread safe.
+/// one if numThreads() threads take them, so that results come at every stamp, and soon. Thread safe.
 class CameraSchedule {
  public:
   static constexpr double kReserve_s = 0.2, kLongestPause_s = 0.4;
@@ -30,6 +30,8 @@ class CameraSchedule {
   CameraSchedule(const CameraRig& rig, double budget_s_per_s);
 
   bool hasLimit() const { return budget_s_per_s_ > 0.0; }
+  /// As many as the budget keeps busy, at least one.
+  size_t numThreads() const;
 
   /// The cameras of the candidates (one per camera of the rig) that get a turn, the most urgent first.
   /// `velocity`: forward (m/s), to the left (m/s) and turn (rad/s) of the vehicle.
