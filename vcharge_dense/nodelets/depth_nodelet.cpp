@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
@@ -34,7 +36,10 @@ class DepthNodelet : public Nodelet, private DriveConsumer {
     }
     readOptions("options", &options);
     openSource(rig_, options.cameras);
-    schedule_ = std::make_unique<StageSchedule>(*rig_, processorBudget());
+    const double budget = processorBudget();
+    // As many threads as the budget keeps busy.
+    const auto num_threads = static_cast<size_t>(std::max(1.0, std::ceil(budget)));
+    schedule_ = std::make_unique<StageSchedule>(*rig_, budget, num_threads);
     mapper_ = std::make_unique<RangeMapper>(rig_, options,
                                             [this](RangeTask task) { tasks_.push_back(std::move(task)); });
     sweeps_ = std::make_unique<ScheduledSweeps>(&node(), rig_, mapper_.get(), schedule_.get(), &guard(),

@@ -35,9 +35,10 @@ double threadProcessorTime_s() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-CameraSchedule::CameraSchedule(const CameraRig& rig, double budget_s_per_s)
-    : budget_s_per_s_(budget_s_per_s), credit_s_(budget_s_per_s * kReserve_s) {
-  check(budget_s_per_s >= 0.0, "CameraSchedule: expected a budget of at least 0");
+CameraSchedule::CameraSchedule(const CameraRig& rig, double budget_s_per_s, size_t num_threads)
+    : budget_s_per_s_(budget_s_per_s), num_threads_(num_threads), credit_s_(budget_s_per_s * kReserve_s) {
+  check(budget_s_per_s >= 0.0 && num_threads > 0,
+        "CameraSchedule: expected a budget of at least 0, and threads");
   for (const RigCamera& camera : rig.cameras) {
     Camera& added = cameras_.emplace_back();
     if (camera.vehicle_from_camera) {
@@ -84,17 +85,13 @@ double CameraSchedule::weightOf(const Camera& camera, const Eigen::Vector3d& vel
 size_t CameraSchedule::affordableTurns() const {
   size_t turns = 0;
   for (double left_s = credit_s_; left_s > 0.0 && turns < cameras_.size(); left_s -= turn_s_) {
-    const size_t before_it = turns / numThreads();  // in the same thread
+    const size_t before_it = turns / num_threads_;  // in the same thread
     if (before_it > 0 && static_cast<double>(before_it + 1) * turn_passed_s_ > kPartOfStep * step_s_) {
       break;
     }
     ++turns;
   }
   return turns;
-}
-
-size_t CameraSchedule::numThreads() const {
-  return std::max<size_t>(1, static_cast<size_t>(std::ceil(budget_s_per_s_)));
 }
 
 /// Shares the turns out in proportion to the weights (smooth weighted round robin).

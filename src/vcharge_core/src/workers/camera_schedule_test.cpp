@@ -134,5 +134,14 @@ TEST(CameraScheduleTest, ThreadProcessorTimePasses) {
   EXPECT_GT(begin_s, 0.0);
 }
 
+TEST(CameraScheduleTest, TwoThreadsTakeTwiceAsManyTurns) {
+  CameraSchedule schedule(fourCameras(), 2.0, 2);
+  std::vector<size_t> per_stamp;
+  turnsOf(&schedule, 0.02, kStanding, &per_stamp, 0.03);
+  EXPECT_EQ(per_stamp.back(), 4U);
+  turnsOf(&schedule, 0.02, kStanding, &per_stamp, 0.2);
+  EXPECT_EQ(per_stamp.back(), 2U);
+}
+
 }  // namespace
 }  // namespace vcharge

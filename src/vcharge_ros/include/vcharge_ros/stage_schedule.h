@@ -22,7 +22,8 @@ namespace vcharge {
 /// which cameras it is done for. 0: no limit, and as many threads as there are processors. Thread safe.
 class StageSchedule {
  public:
-  StageSchedule(const CameraRig& rig, double budget_s_per_s);
+  /// `num_threads`: of runTurns().
+  StageSchedule(const CameraRig& rig, double budget_s_per_s, size_t num_threads = 1);
 
   bool hasLimit() const { return schedule_.hasLimit(); }
   /// Motion of the vehicle, for choose().
@@ -44,7 +45,7 @@ class StageSchedule {
       }
     });
   }
-  /// run() for each of the chosen cameras, the first ones first, in CameraSchedule::numThreads() threads.
+  /// run() for each of the chosen cameras, the first ones first, in several threads.
   /// `work` takes the camera, and is called by several threads at once.
   void runTurns(const std::vector<size_t>& cameras, const std::function<void(size_t camera)>& work);
   /// Adds budget, use, and the stamps at which a camera, or each camera of the rig, was left out; warns if

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <future>
 #include <string>
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <opencv2/core/utility.hpp>
 
@@ -13,7 +13,8 @@
 
 namespace vcharge {
 
-StageSchedule::StageSchedule(const CameraRig& rig, double budget_s_per_s) : schedule_(rig, budget_s_per_s) {
+StageSchedule::StageSchedule(const CameraRig& rig, double budget_s_per_s, size_t num_threads)
+    : schedule_(rig, budget_s_per_s, num_threads) {
   if (hasLimit()) {
     cv::setNumThreads(1);  // of the whole process: all stages share the processors
   }
@@ -66,7 +67,7 @@ void StageSchedule::runAndCount(const std::function<size_t()>& work) {
 void StageSchedule::runTurns(const std::vector<size_t>& cameras,
                              const std::function<void(size_t camera)>& work) {
   std::atomic<size_t> next = 0;
-  const auto takeTurns = [&](size_t /*thread*/) {
+  const auto takeTurns = [&] {
     for (size_t i = next++; i < cameras.size(); i = next++) {
       runAndCount([&]() -> size_t {
         work(cameras[i]);
@@ -74,14 +75,16 @@ void StageSchedule::runTurns(const std::vector<size_t>& cameras,
       });
     }
   };
+  // Not in workers of TBB: other stages' loops occupy them.
+  std::vector<std::future<void>> others;
   const size_t num_threads = hasLimit() ? std::min(schedule_.numThreads(), cameras.size()) : 1;
-  if (num_threads < 2) {
-    takeTurns(0);
-    return;
+  for (size_t thread = 1; thread < num_threads; ++thread) {
+    others.push_back(std::async(std::launch::async, takeTurns));
   }
-  tbb::task_arena(static_cast<int>(num_threads)).execute([&] {
-    tbb::parallel_for(size_t{0}, num_threads, takeTurns);
-  });
+  takeTurns();
+  for (std::future<void>& other : others) {
+    other.get();
+  }
 }
 
 void StageSchedule::describe(size_t camera, DriveMonitor::Report* report) const {

@@ -21,17 +21,16 @@ double threadProcessorTime_s();
 /// others have one, and one more if it sees something that moves nearby. Work is measured in processor
 /// seconds per second of the drive, and the budget is held on average: time that was not used is kept for
 /// kReserve_s, and overdrawn time is paid back. There are no more turns at a stamp than end before the next
-/// one if numThreads() threads take them, so that results come at every stamp, and soon. Thread safe.
+/// one if `num_threads` threads take them, so that results come at every stamp, and soon. Thread safe.
 class CameraSchedule {
  public:
   static constexpr double kReserve_s = 0.2, kLongestPause_s = 0.4;
 
   /// Cameras without extrinsics look nowhere in particular. `budget_s_per_s`: 0 without a limit.
-  CameraSchedule(const CameraRig& rig, double budget_s_per_s);
+  CameraSchedule(const CameraRig& rig, double budget_s_per_s, size_t num_threads = 1);
 
   bool hasLimit() const { return budget_s_per_s_ > 0.0; }
-  /// As many as the budget keeps busy, at least one.
-  size_t numThreads() const;
+  size_t numThreads() const { return num_threads_; }
 
   /// The cameras of the candidates (one per camera of the rig) that get a turn, the most urgent first.
   /// `velocity`: forward (m/s), to the left (m/s) and turn (rad/s) of the vehicle.
@@ -63,6 +62,7 @@ class CameraSchedule {
   void passTime(Timestamp stamp);
 
   const double budget_s_per_s_;
+  const size_t num_threads_;
   mutable std::mutex mutex_;
   std::vector<Camera> cameras_;
   std::optional<Timestamp> now_;
