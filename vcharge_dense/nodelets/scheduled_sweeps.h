@@ -71,6 +71,7 @@ class ScheduledSweeps {
       announcement.cameras.push_back(rig_->cameras[camera].name);
     }
     scheduled_.publish(announcement);
+    schedule_->letResultsGoFirst();
     schedule_->runTurns(chosen, [&](size_t camera) {
       const auto task = std::find_if(instant.begin(), instant.end(),
                                      [camera](const RangeTask& each) { return each.camera_index == camera; });

@@ -24,8 +24,7 @@ namespace vcharge {
 /// While the vehicle drives, objects behind obstacles of obstacle_nodelet's last /obstacles/grid are left
 /// out; which grid is the last one depends on its arrival, also in a replay without loss. Parameters: ~rig
 /// (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions), ~processor_budget (see
-/// StageSchedule), ~lossless_replay (every image in order, as detect_obstacles; otherwise images that wait
-/// too long are dropped, and counted in /diagnostics).
+/// StageSchedule), ~lossless_replay (every image in order; otherwise those that wait too long are dropped).
 class ObjectNodelet : public Nodelet, private DriveConsumer {
  public:
   ObjectNodelet() : Nodelet("objects") {}
@@ -78,6 +77,7 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
   }
 
   void work(const Task& task) {
+    schedule_->letResultsGoFirst();
     const std::lock_guard<std::mutex> lock(mutex_);
     schedule_->run([&] {
       num_turns_ = 0;

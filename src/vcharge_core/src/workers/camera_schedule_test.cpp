@@ -134,6 +134,22 @@ TEST(CameraScheduleTest, ThreadProcessorTimePasses) {
   EXPECT_GT(begin_s, 0.0);
 }
 
+TEST(CameraScheduleTest, DroppedStampsLeaveNoMoreTimeForTurns) {
+  CameraSchedule schedule(fourCameras(), 2.0);
+  std::vector<size_t> last;
+  for (int i = 0; i < 100; ++i) {
+    if (i % 10 < 8 && i % 2 == 1) {
+      continue;  // dropped
+    }
+    const std::vector<bool> all(kNumCameras, true);
+    last = schedule.choose(Timestamp::fromSeconds(1.0 + 0.08 * i), all, kStanding);
+    for (size_t turn = 0; turn < last.size(); ++turn) {
+      schedule.spend(0.02, 0.05, 1);
+    }
+  }
+  EXPECT_EQ(last.size(), 1U);
+}
+
 TEST(CameraScheduleTest, TwoThreadsTakeTwiceAsManyTurns) {
   CameraSchedule schedule(fourCameras(), 2.0, 2);
   std::vector<size_t> per_stamp;

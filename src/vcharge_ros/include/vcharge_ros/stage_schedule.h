@@ -30,6 +30,9 @@ class StageSchedule {
   void setOdometry(const VehicleOdometry& odometry);
   /// What moves, in `odom`.
   void setObjects(const vcharge_msgs::TrackedObjects& objects);
+  /// With a limit, the calling thread and those of runTurns() let other stages go first from now on: what is
+  /// farther along the chain of stages is not held up by newer work. Not for threads of the nodelet manager.
+  void letResultsGoFirst() const;
   /// See CameraSchedule::choose().
   std::vector<size_t> choose(Timestamp stamp, const std::vector<bool>& candidates);
   /// Does work and counts its processor time, see CameraSchedule::spend(). `work` may return a number of

@@ -40,6 +40,12 @@ void StageSchedule::setObjects(const vcharge_msgs::TrackedObjects& objects) {
   schedule_.setObjects(in_vehicle_m);
 }
 
+void StageSchedule::letResultsGoFirst() const {
+  if (hasLimit()) {
+    letOthersGoFirst();
+  }
+}
+
 std::vector<size_t> StageSchedule::choose(Timestamp stamp, const std::vector<bool>& candidates) {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -15,6 +16,10 @@ namespace vcharge {
 
 /// Processor time of the calling thread, in seconds.
 double threadProcessorTime_s();
+
+/// Gives the calling thread, and those that it starts, a ninth of the weight of other threads. Without effect
+/// where the system does not allow it.
+void letOthersGoFirst();
 
 /// Decides which cameras a stage works on at a stamp if it may not use the processor for all of them. They
 /// take turns: a camera that looks where it is going (by speed, gear and turn) has up to two turns while
@@ -67,9 +72,10 @@ class CameraSchedule {
   std::vector<Camera> cameras_;
   std::optional<Timestamp> now_;
   double credit_s_;
-  double turn_s_ = 0.0;                        // mean processor time of a turn
-  double turn_passed_s_ = 0.0, step_s_ = 0.0;  // mean duration of a turn, and between stamps
-  double used_s_per_s_ = 0.0;                  // with exponentially decreasing weights
+  double turn_s_ = 0.0;         // mean processor time of a turn
+  double turn_passed_s_ = 0.0;  // mean duration of a turn
+  std::deque<double> steps_s_;  // the latest times between stamps
+  double used_s_per_s_ = 0.0;   // with exponentially decreasing weights
   std::optional<Timestamp> last_short_, last_turn_;
 };
 
