@@ -37,8 +37,8 @@ class DepthNodelet : public Nodelet, private DriveConsumer {
     readOptions("options", &options);
     openSource(rig_, options.cameras);
     const double budget = processorBudget();
-    // Twice as many as the budget keeps busy: range maps come sooner.
-    const auto num_threads = static_cast<size_t>(std::max(1.0, std::ceil(2.0 * budget)));
+    // As many as the budget keeps busy: more of them hold up each other and the stages that follow.
+    const auto num_threads = static_cast<size_t>(std::max(1.0, std::ceil(budget)));
     schedule_ = std::make_unique<StageSchedule>(*rig_, budget, num_threads);
     mapper_ = std::make_unique<RangeMapper>(rig_, options,
                                             [this](RangeTask task) { tasks_.push_back(std::move(task)); });
