@@ -46,7 +46,7 @@ class PolarGrid {
   /// Bin of an inverse range; outside [0, numBins()) if it is too near or too far.
   int binOfInverse(float inverse_range_per_m) const {
     const float bin = (inverse_range_per_m - min_inverse_) * bins_per_inverse_;
-    const auto towards_zero = static_cast<int>(bin);
+    const auto towards_zero = static_cast<int>(bin);  // std::floor is a call, for every pixel
     return towards_zero - (bin < static_cast<float>(towards_zero) ? 1 : 0);
   }
   double range_m(int bin) const {

@@ -48,8 +48,7 @@ class StageSchedule {
       }
     });
   }
-  /// run() for each of the chosen cameras, the first ones first, in several threads.
-  /// `work` takes the camera, and is called by several threads at once.
+  /// run() for each of the chosen cameras, the first ones first, in `num_threads` threads at once.
   void runTurns(const std::vector<size_t>& cameras, const std::function<void(size_t camera)>& work);
   /// Adds budget, use, and the stamps at which a camera, or each camera of the rig, was left out; warns if
   /// that happened lately.

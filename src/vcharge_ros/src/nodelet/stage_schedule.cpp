@@ -83,7 +83,7 @@ void StageSchedule::runTurns(const std::vector<size_t>& cameras,
   };
   // Not in workers of TBB: other stages' loops occupy them.
   std::vector<std::future<void>> others;
-  const size_t num_threads = hasLimit() ? std::min(schedule_.numThreads(), cameras.size()) : 1;
+  const size_t num_threads = std::min(schedule_.numThreads(), cameras.size());
   for (size_t thread = 1; thread < num_threads; ++thread) {
     others.push_back(std::async(std::launch::async, takeTurns));
   }
