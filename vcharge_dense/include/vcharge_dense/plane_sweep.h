@@ -19,6 +19,7 @@
 namespace vcharge {
 
 class CoarsePass;
+struct CoarseSurface;
 class SurfaceMemory;
 class SweepLevel;
 struct SurfaceEstimate;
@@ -66,7 +67,8 @@ struct SweepDetails {
 /// A range is also unknown where the window has no texture, where the best plane is the first or last of its
 /// family (the surface may lie beyond it), where the score is low, and where the standard deviation is large,
 /// as towards the direction of travel, where points hardly move in the image. With num_fill_levels such
-/// pixels are filled with the range of a sweep at a lower resolution.
+/// pixels are filled with the range of a sweep at a lower resolution, with coarse_pass that of the coarse
+/// pass.
 ///
 /// Immutable: any number of threads may use one object, and results do not depend on their number.
 class PlaneSweep {
@@ -91,10 +93,12 @@ class PlaneSweep {
   const std::vector<PlaneFamily>& families() const;
 
  private:
-  SurfaceEstimate sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
+  SurfaceEstimate sweepPlanes(const SweepInput& input, const SurfaceEstimate& coarse,
                               const SurfaceMemory* memory) const;
   RangeMap sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details,
                  const SurfaceMemory* memory) const;
+  RangeMap rangeMap(const SweepInput& input, SurfaceEstimate* estimate) const;  // refines the estimate
+  RangeMap rangeMap(CoarseSurface* surface) const;  // of a coarse pass at this resolution
 
   std::shared_ptr<const SweepLevel> level_;
   std::shared_ptr<const CoarsePass> coarse_;  // null: all planes are swept everywhere

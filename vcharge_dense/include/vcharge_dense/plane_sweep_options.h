@@ -80,7 +80,7 @@ struct PlaneSweepOptions {
                  "Samples of the second, finer sweep around the surface of the first; 0: no second sweep.");
   VCHARGE_OPTION_GROUP(PoseNoiseOptions, pose_noise, {}, "Random errors of the images' relative poses.");
   VCHARGE_OPTION(
-      double, min_texture, 2.0, notNegative(),
+      double, min_texture, 1.0, notNegative(),
       "Standard deviation in gray levels of the reference window below which the range is unknown.");
   VCHARGE_OPTION(
       double, min_confidence, 0.25, atLeast(0.0).below(1.0),

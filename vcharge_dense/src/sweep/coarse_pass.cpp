@@ -85,13 +85,17 @@ CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::option
   level_ = halfLevel(*fine_, options, ground_in_camera);
 }
 
-SurfaceEstimate CoarsePass::sweep(const SweepInput& fine, SweepPixels half_pixels, bool is_predicted) const {
+CoarseSurface CoarsePass::sweep(const SweepInput& fine, SweepPixels half_pixels, bool is_predicted) const {
   if (is_predicted) {
     leaveOutHalf(fine, &half_pixels);
   }
-  const SweepInput half_input = halfInput(*level_, fine, half_pixels);
+  SweepInput half_input = halfInput(*level_, fine, half_pixels);
   const std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kLarge);
-  return level_->sweepPlanes(half_input, tiles, {});
+  SurfaceEstimate estimate = level_->sweepPlanes(half_input, tiles, {});
+  std::vector<cv::Mat>& left = half_pixels.neighbours;
+  left.erase(std::remove_if(left.begin(), left.end(), [](const cv::Mat& image) { return image.empty(); }),
+             left.end());
+  return {std::move(half_pixels), std::move(half_input), std::move(estimate)};
 }
 
 TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rect& tile) const {

@@ -18,6 +18,13 @@ inline bool isConfident(float score, float second_score) {
   return score >= kConfidentScore && score - second_score >= kConfidentLead;
 }
 
+/// What a coarse pass found, and the images in which it did.
+struct CoarseSurface {
+  SweepPixels pixels;
+  SweepInput input;
+  SurfaceEstimate estimate;
+};
+
 /// A sweep at half the resolution over every second plane. It selects the planes that each tile of the main
 /// sweep needs: on two simulated drives a third of all planes, without loss of accuracy.
 class CoarsePass {
@@ -28,7 +35,7 @@ class CoarsePass {
   /// `half_pixels`: the halved images of `fine`. Where an earlier map predicts the surface, the images at
   /// every second baseline on each side of the reference suffice, from the shortest on, if at least two
   /// remain.
-  SurfaceEstimate sweep(const SweepInput& fine, SweepPixels half_pixels, bool is_predicted) const;
+  CoarseSurface sweep(const SweepInput& fine, SweepPixels half_pixels, bool is_predicted) const;
 
   /// The planes of each tile: those near the planes that confident pixels in and around it found, or all
   /// planes if too few pixels are confident.

@@ -190,7 +190,7 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  const SurfaceEstimate found = coarse.sweep(input, setup.halfPixels(), false);
+  const SurfaceEstimate found = coarse.sweep(input, setup.halfPixels(), false).estimate;
   EXPECT_EQ(found.score.size(), cv::Size(kSize.width / 2, kSize.height / 2));
   const std::vector<TilePlanes> choice = coarse.choosePlanes(found, setup.tiles);
   const Hypotheses& planes = setup.level->planes().front();
@@ -224,8 +224,8 @@ TEST(CoarsePassTest, HalfOfTheImagesFindASurfaceThatIsPredicted) {
   const Level setup;
   const CoarsePass coarse(setup.level, setup.sequence.ground);
   const SweepPixels half = setup.halfPixels();
-  const SurfaceEstimate with_all = coarse.sweep(setup.input(), half, false);
-  const SurfaceEstimate with_half = coarse.sweep(setup.input(), half, true);
+  const SurfaceEstimate with_all = coarse.sweep(setup.input(), half, false).estimate;
+  const SurfaceEstimate with_half = coarse.sweep(setup.input(), half, true).estimate;
   int confident = 0, agree = 0, voters = 0;
   for (int y = 0; y < with_all.score.rows; ++y) {
     for (int x = 0; x < with_all.score.cols; ++x) {

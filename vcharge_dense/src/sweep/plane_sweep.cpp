@@ -86,14 +86,9 @@ const std::vector<PlaneFamily>& PlaneSweep::families() const {
   return level_->families();
 }
 
-SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
+SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SurfaceEstimate& coarse,
                                         const SurfaceMemory* memory) const {
   const cv::Size size = level_->validMask().size();
-  if (!coarse_) {
-    return level_->sweepPlanes(input, makeTiles(size), {});
-  }
-  const SurfaceEstimate coarse =
-      coarse_->sweep(input, half_pixels, memory != nullptr && memory->predictsMuch());
   std::vector<cv::Rect> tiles = makeTiles(size, TileSize::kSmall);
   SurfaceEstimate estimate(size);
   if (memory != nullptr) {
@@ -135,30 +130,49 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
 
 RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details,
                            const SurfaceMemory* memory) const {
-  const cv::Size size = level_->validMask().size();
-  const bool has_neighbours = !input.neighbours.empty();
-  SweepPixels half_pixels;
-  SurfaceEstimate estimate(size);
-  if (has_neighbours) {
-    half_pixels = coarse_ || half_ ? halved(pixels) : SweepPixels();
-    estimate = sweepPlanes(input, half_pixels, memory);
+  SurfaceEstimate estimate(level_->validMask().size());
+  std::optional<RangeMap> half;
+  if (!input.neighbours.empty() && coarse_) {
+    CoarseSurface coarse = coarse_->sweep(input, halved(pixels), memory != nullptr && memory->predictsMuch());
+    estimate = sweepPlanes(input, coarse.estimate, memory);
+    if (half_) {
+      half = half_->rangeMap(&coarse);
+    }
+  } else if (!input.neighbours.empty()) {
+    estimate = level_->sweepPlanes(input, makeTiles(level_->validMask().size()), {});
+    if (half_) {
+      const SweepPixels half_pixels = halved(pixels);
+      half = half_->sweep(halfInput(*half_->level_, input, half_pixels), half_pixels, nullptr, nullptr);
+    }
   }
-  const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
-  if (found && options().num_refinement_steps > 0) {
-    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate),
-                          makeTiles(size, TileSize::kLow), &estimate);
-  }
-
-  RangeMap map{Timestamp(), "", "", level_->camera(), {}, {}, {}};
-  estimateRange(input, estimate, &map);
-  if (half_ && has_neighbours) {
-    fillUnknown(half_->sweep(halfInput(*half_->level_, input, half_pixels), half_pixels, nullptr, nullptr),
-                &map);
+  RangeMap map = rangeMap(input, &estimate);
+  if (half) {
+    fillUnknown(*half, &map);
   }
   if (details != nullptr) {
     details->score = estimate.score;
     details->plane = estimate.plane;
     details->voters = estimate.voters;
+  }
+  return map;
+}
+
+RangeMap PlaneSweep::rangeMap(const SweepInput& input, SurfaceEstimate* estimate) const {
+  const bool found = cv::countNonZero(estimate->plane >= 0) > 0;
+  if (found && options().num_refinement_steps > 0) {
+    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), *estimate),
+                          makeTiles(level_->validMask().size(), TileSize::kLow), estimate);
+  }
+  RangeMap map{Timestamp(), "", "", level_->camera(), {}, {}, {}};
+  estimateRange(input, *estimate, &map);
+  return map;
+}
+
+RangeMap PlaneSweep::rangeMap(CoarseSurface* surface) const {
+  RangeMap map = rangeMap(surface->input, &surface->estimate);
+  if (half_) {  // then there is a coarse pass too
+    CoarseSurface coarse = coarse_->sweep(surface->input, halved(surface->pixels), false);
+    fillUnknown(half_->rangeMap(&coarse), &map);
   }
   return map;
 }
