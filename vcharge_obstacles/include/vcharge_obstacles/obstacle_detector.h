@@ -26,8 +26,9 @@ struct ObstacleDetectorOptions {
   VCHARGE_OPTION_GROUP(GroundPlaneOptions, ground, {}, "The ground plane of a range map.");
   VCHARGE_OPTION(double, min_height_m, 0.08, above(0.0).below(kReferenceHeight_m),
                  "Height up to which a point is ground.");
-  VCHARGE_OPTION(double, max_height_m, 2.0, above(kReferenceHeight_m),
-                 "Height above which the vehicle passes below an obstacle.");
+  VCHARGE_OPTION(double, max_height_m, 1.8, above(kReferenceHeight_m),
+                 "Measured height above which the vehicle passes below an obstacle: its own and a margin, as "
+                 "heights over 5 m away may be 0.2 m wrong.");
   VCHARGE_OPTION(double, min_confidence, 0.4, atLeast(0.0).below(1.0), "Least confidence of a range used.");
   VCHARGE_OPTION(double, min_support, 0.3, above(0.0).upTo(0.5),
                  "Points that make an obstacle, as a fraction of those of one 0.2 m high.");

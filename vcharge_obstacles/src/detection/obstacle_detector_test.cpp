@@ -94,6 +94,24 @@ TEST_F(ObstacleDetectorTest, WallIsReportedAtItsRangeWithItsHeight) {
   }
 }
 
+TEST_F(ObstacleDetectorTest, WhatHangsHigherThanTheVehicleIsNoObstacleDespiteShortRanges) {
+  const RigCamera& camera = rig_.cameras[rig_.cameraIndex("front")];
+  const auto countBelow = [&](double bottom_m) {
+    const BoxWorld board{{{{9.7, -1.5, bottom_m}, {9.8, 1.5, bottom_m + 0.28}}}};
+    RangeMap map = measureBoxWorld(board, camera, {}, Timestamp(), {0.01, 0.0, 3});
+    const RayTable rays(map.camera, map.range_m.size(), 2.0 * M_PI);
+    for (int y = 0; y < map.range_m.rows; ++y) {
+      for (int x = 0; x < map.range_m.cols; ++x) {
+        const Eigen::Vector3d ray = camera.vehicle_from_camera->rotation() * rays.ray(x, y).cast<double>();
+        map.range_m.at<float>(y, x) *= ray.z() > 0.0 ? 0.9F : 1.0F;
+      }
+    }
+    return countObstacles(detectIn(map, camera));
+  };
+  EXPECT_EQ(countBelow(2.14), 0);  // seen 1.99 m up
+  EXPECT_GT(countBelow(1.5), 10);
+}
+
 TEST_F(ObstacleDetectorTest, KerbIsReportedWithItsHeight) {
   const BoxWorld world{{{{-20.0, 2.5, 0.0}, {20.0, 3.2, 0.12}}}};
   const CameraObstacles seen = detect(world, "left", {}, {0.005, 0.0, 3});
