@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "illumination/vehicle_light.h"
 #include "range_mapping/extrinsics_noise.h"
 #include "range_mapping/inter_camera_stereo.h"
 #include "range_mapping/motion_refinement.h"
@@ -35,6 +36,7 @@ struct RangeMapper::Camera {
   RigidTransform vehicle_from_camera;
   WorkingCamera working_camera;
   PlaneSweep plane_sweep;
+  VehicleLight light;
   std::deque<Frame> frames;
   size_t next_reference = 0;  // the first frame that was not yet passed on
   RangeMapperStatus status;
@@ -77,14 +79,9 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
       ground = groundInCamera(*camera.vehicle_from_camera);
     }
     cameras_[index].reset(
-        new Camera{index,
-                   *camera.vehicle_from_camera,
-                   working,
+        new Camera{index, *camera.vehicle_from_camera, working,
                    PlaneSweep(working.model(), working.validMask(), options_.plane_sweep, ground),
-                   {},
-                   0,
-                   {},
-                   {}});
+                   VehicleLight(working.model(), working.validMask(), *camera.vehicle_from_camera)});
     cameras_[index]->status.camera_name = camera.name;
     cameras_[index]->status.message = "no image yet";
   }
@@ -134,6 +131,7 @@ void RangeMapper::startOver(DriveBreak drive_break) {
       camera->frames.clear();
       camera->next_reference = 0;
       camera->memory.clear();
+      camera->light.clear();
       ++camera->status.resets;
       camera->status.state = RangeMapperState::kFewNeighbours;
       camera->status.message = "started over: " + describe(drive_break);
@@ -232,7 +230,8 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, Work
       ++camera->status.resets;
     }
   }
-  addFrame(camera, {stamp, images->of(camera->index), world_from_camera}, images->instant(camera->index));
+  const cv::Mat pixels = camera->light.removeFrom(images->of(camera->index), world_from_camera);
+  addFrame(camera, {stamp, pixels, world_from_camera}, images->instant(camera->index));
 }
 
 void RangeMapper::addFrame(Camera* camera, const SweepImage& frame,
