@@ -15,7 +15,7 @@ namespace {
 // Earlier images count less by a factor of e after this path and this turn.
 constexpr double kPath_m = 3.0, kTurn_rad = 0.15;
 constexpr double kMinPath_m = 0.5;
-constexpr double kMaxStep_m = 1.0;  // of one image
+constexpr double kMaxStep_m = 1.0;  // The path of one image counts up to this.
 // Added to gray levels before their logarithm, so that noise of dark pixels stays small.
 constexpr float kDark = 2.0F;
 constexpr double kMaxGround_m = 20.0;

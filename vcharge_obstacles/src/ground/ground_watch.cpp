@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "ground/ground_match.h"
+#include "light/ground_light.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -48,7 +49,8 @@ struct GroundWatch::Implementation {
         vehicle_from_camera(body_from_camera),
         size(camera.size()),
         rays(camera, body_from_camera, grid),
-        match(camera, body_from_camera, rays, options.min_difference) {}
+        match(camera, body_from_camera, rays, options.min_difference),
+        light(rays) {}
 
   void checkImage(const cv::Mat& image) const {
     check(image.type() == CV_8UC1 && image.size() == size,
@@ -77,6 +79,7 @@ struct GroundWatch::Implementation {
   const cv::Size size;
   const PixelRays rays;
   const GroundMatch match;
+  GroundLight light;
   std::deque<GroundView> views;  // the last one is the current one
   std::optional<Timestamp> stands_since;
   std::optional<GroundView> first_at_rest;
@@ -189,7 +192,7 @@ GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, con
   const RigidTransform planar =
       RigidTransform::planar(fixed_from_vehicle.translation().x(), fixed_from_vehicle.translation().y(),
                              yawOfRotation(fixed_from_vehicle.rotation()));
-  self.addView(stamp, image, planar * levelFromBody(ground));
+  self.addView(stamp, self.light.even(image, planar), planar * levelFromBody(ground));
   const GroundMatch::Ground rays_to_ground = self.match.meet(ground);
   GroundAppearance appearance;
   if (const GroundView* before = self.viewBefore(stamp)) {
@@ -234,6 +237,7 @@ StandingAppearance GroundWatch::compareStanding(Timestamp stamp, const cv::Mat& 
 
 void GroundWatch::clear() {
   implementation_->views.clear();
+  implementation_->light.clear();
   implementation_->stands_since.reset();
   implementation_->first_at_rest.reset();
 }
