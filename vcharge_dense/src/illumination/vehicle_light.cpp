@@ -1,7 +1,6 @@
 #include "illumination/vehicle_light.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/Core>
