@@ -91,13 +91,20 @@ GroundMatch::GroundMatch(const WorkingCamera& camera, const RigidTransform& vehi
       size_(camera.size()),
       rays_(rays),
       min_difference_(static_cast<float>(min_difference)),
-      warp_(camera.model(), innerPixels(camera)) {}
+      warp_(camera.model(), innerPixels(camera)),
+      reflection_(warp_) {}
 
 /// Pixels of the newer image that matter, and the points of the ground that they show.
 struct GroundMatch::Band {
   cv::Rect rows;
   std::vector<size_t> rays;  // by row
   PixelPoints ground;        // of the inner ones
+};
+
+/// Brightness in a band's rows.
+struct GroundMatch::Compared {
+  const cv::Mat &here, &on_ground, &knows_ground;
+  float gain;  // by which the older image has to be multiplied
 };
 
 GroundMatch::Ground GroundMatch::meet(const GroundPlane& plane) const {
@@ -142,7 +149,7 @@ GroundMatch::Band GroundMatch::pixelsIn(const Ground& ground, double near_m, dou
 
 std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const GroundView& before,
                                                const Ground& ground, double near_m, double far_m,
-                                               Wanted wanted) const {
+                                               Wanted wanted, Reflections reflections) const {
   const Band band = pixelsIn(ground, near_m, far_m);
   if (band.rows.empty()) {
     return {};
@@ -200,9 +207,37 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
     const bool has_texture = keeps_texture.data[in_rows] != 0;
     const bool differs = differsWith(gain) && (!has_texture || differsWith(local_gain.ptr<float>()[in_rows]));
     result.push_back({ray, inverse, inverse * to_low, fit.data[in_rows] == PlaneFit::kGround,
-                      fit.data[in_rows] == PlaneFit::kOther, differs, has_texture});
+                      fit.data[in_rows] == PlaneFit::kOther, differs, has_texture, 1.0F});
+  }
+  if (reflections == Reflections::kSought) {
+    seekReflections(now, before, band, {here, on_ground, knows_ground, gain}, &result);
   }
   return result;
+}
+
+/// Finds which part of the differences of pixels that changed or are other is unexplained.
+void GroundMatch::seekReflections(const GroundView& now, const GroundView& before, const Band& band,
+                                  const Compared& compared, std::vector<MatchedPixel>* pixels) const {
+  const int first_pixel = band.rows.y * size_.width;
+  cv::Mat asked = cv::Mat::zeros(band.rows.size(), CV_8UC1);
+  for (const MatchedPixel& pixel : *pixels) {
+    if (pixel.is_changed || pixel.is_other) {
+      asked.data[rays_.pixel[pixel.ray] - first_pixel] = 255;
+    }
+  }
+  if (cv::countNonZero(asked) == 0) {
+    return;
+  }
+  cv::Mat difference;
+  cv::addWeighted(compared.here, 1.0, compared.on_ground, -compared.gain, 0.0, difference, CV_32F);
+  difference.setTo(cv::Scalar(0.0), compared.knows_ground == 0);
+  const cv::Mat unexplained = reflection_.unexplained(
+      {now.smooth, now.fixed_from_body * vehicle_from_camera_},
+      {before.smooth, before.fixed_from_body * vehicle_from_camera_},
+      {band.rows, band.ground, now.fixed_from_body, difference, compared.gain}, asked);
+  for (MatchedPixel& pixel : *pixels) {
+    pixel.unexplained = unexplained.ptr<float>()[rays_.pixel[pixel.ray] - first_pixel];
+  }
 }
 
 }  // namespace vcharge

@@ -8,6 +8,7 @@
 
 #include "detection/pixel_rays.h"
 #include "ground/point_warp.h"
+#include "light/ground_reflection.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/motion/rigid_transform.h"
@@ -33,6 +34,7 @@ struct MatchedPixel {
   bool is_other;                   ///< fits the plane above better, or neither
   bool is_changed;                 ///< not the brightness of the ground, nor the ground in other light
   bool keeps_texture;              ///< its surroundings have the texture of the ground
+  float unexplained;  ///< part of the difference that a reflection does not explain; 1 if none was sought
 };
 
 /// Compares two images of a camera by the plane of the ground: the older one is warped as if all pixels
@@ -43,6 +45,10 @@ class GroundMatch {
   enum class Wanted {
     kChanges,  ///< MatchedPixel::is_changed only, for a fraction of the time
     kAll,
+  };
+  enum class Reflections {
+    kIgnored,
+    kSought,  ///< for pixels that changed or are other
   };
   /// Height of the plane that stands for obstacles; the decision falls halfway.
   static constexpr double kRaised_m = 0.2;
@@ -59,18 +65,24 @@ class GroundMatch {
   Ground meet(const GroundPlane& plane) const;
   /// Pixels whose ground lies between two ranges from the camera; none if the exposures cannot be compared.
   std::vector<MatchedPixel> compare(const GroundView& now, const GroundView& before, const Ground& ground,
-                                    double near_m, double far_m, Wanted wanted) const;
+                                    double near_m, double far_m, Wanted wanted,
+                                    Reflections reflections) const;
 
  private:
   struct Band;
 
+  struct Compared;
+
   Band pixelsIn(const Ground& ground, double near_m, double far_m) const;
+  void seekReflections(const GroundView& now, const GroundView& before, const Band& band,
+                       const Compared& compared, std::vector<MatchedPixel>* pixels) const;
 
   const RigidTransform vehicle_from_camera_;
   const cv::Size size_;
   const PixelRays& rays_;
   const float min_difference_;
   const PointWarp warp_;
+  const GroundReflection reflection_;
 };
 
 }  // namespace vcharge

@@ -7,6 +7,7 @@
 
 #include "ground/ground_match.h"
 #include "light/ground_light.h"
+#include "light/mirror_evidence.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -30,6 +31,16 @@ constexpr Band kBands[] = {{1.6, 0.2}, {2.6, 0.3}, {1000.0, 0.6}};
 constexpr float kOtherWeight = 2.0F;
 // Distances of an image, relative to the desired one, with which it is used.
 constexpr double kLeastBaseline = 0.6, kLargestBaseline = 1.6;
+// Part of the difference that a reflection may leave unexplained, and for it to show that the ground is wet.
+constexpr float kUnexplained = 0.5F, kClearlyUnexplained = 0.35F;
+// Least part of the ground's pixels that clearly changed by reflections if the ground is wet. In simulated
+// lots and garages it is 0.003 to 0.025 for a camera in the wet, and up to 0.0013, among movers 0.0035, when
+// dry.
+constexpr double kLeastMirror = 0.002;
+
+bool isReflection(const MatchedPixel& pixel) {
+  return pixel.unexplained < kUnexplained;
+}
 
 /// Pose of the tilted body over level ground.
 RigidTransform levelFromBody(const GroundPlane& ground) {
@@ -70,7 +81,8 @@ struct GroundWatch::Implementation {
   struct Fractions {
     std::vector<float> changed, same;
   };
-  Fractions compareWith(const GroundView& before, const GroundMatch::Ground& ground) const;
+  Fractions compareWith(const GroundView& before, const GroundMatch::Ground& ground,
+                        GroundMatch::Reflections reflections);
   std::vector<float> groundPixels(const GroundMatch::Ground& ground) const;
 
   const double max_distance_m;
@@ -80,6 +92,7 @@ struct GroundWatch::Implementation {
   const PixelRays rays;
   const GroundMatch match;
   GroundLight light;
+  MirrorEvidence mirror{kLeastMirror};
   std::deque<GroundView> views;  // the last one is the current one
   std::optional<Timestamp> stands_since;
   std::optional<GroundView> first_at_rest;
@@ -117,18 +130,24 @@ const GroundView* GroundWatch::Implementation::viewAt(double baseline_m) const {
 }
 
 GroundWatch::Implementation::Fractions GroundWatch::Implementation::compareWith(
-    const GroundView& before, const GroundMatch::Ground& ground) const {
-  const std::vector<MatchedPixel> pixels =
-      match.compare(views.back(), before, ground, kNearest_m, max_distance_m, GroundMatch::Wanted::kChanges);
+    const GroundView& before, const GroundMatch::Ground& ground, GroundMatch::Reflections reflections) {
+  const std::vector<MatchedPixel> pixels = match.compare(
+      views.back(), before, ground, kNearest_m, max_distance_m, GroundMatch::Wanted::kChanges, reflections);
   if (pixels.empty()) {
     return {};
   }
+  if (reflections == GroundMatch::Reflections::kSought) {
+    const auto is_clear = [](const MatchedPixel& pixel) { return pixel.unexplained < kClearlyUnexplained; };
+    mirror.add(pixels.size(), static_cast<size_t>(std::count_if(pixels.begin(), pixels.end(), is_clear)));
+    mirror.endImage();
+  }
+  const bool is_mirror = mirror.isMirror();
   StripSum changed(grid), same(grid), compared(grid);
   for (const MatchedPixel& pixel : pixels) {
     const StripSum::Strip strip =
         compared.stripOf(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse);
     compared.add(strip, 1.0F);
-    if (pixel.is_changed) {
+    if (pixel.is_changed && !(is_mirror && isReflection(pixel))) {
       changed.add(strip, 1.0F);
     } else if (pixel.keeps_texture) {
       same.add(strip, 1.0F);
@@ -145,17 +164,20 @@ GroundWatch::Implementation::Fractions GroundWatch::Implementation::compareWith(
 
 std::vector<float> GroundWatch::Implementation::groundPixels(const GroundMatch::Ground& ground) const {
   StripSum shown(grid), other(grid), compared(grid);
+  const GroundMatch::Reflections reflections =
+      mirror.isMirror() ? GroundMatch::Reflections::kSought : GroundMatch::Reflections::kIgnored;
   double near_m = kNearest_m;
   for (const Band& band : kBands) {
     const GroundView* before = viewAt(band.baseline_m);
     const double far_m = std::min(band.far_m, max_distance_m);
     if (before != nullptr && far_m > near_m) {
-      for (const MatchedPixel& pixel :
-           match.compare(views.back(), *before, ground, near_m, far_m, GroundMatch::Wanted::kAll)) {
+      for (const MatchedPixel& pixel : match.compare(views.back(), *before, ground, near_m, far_m,
+                                                     GroundMatch::Wanted::kAll, reflections)) {
         const StripSum::Strip strip =
             compared.stripOf(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse);
         compared.add(strip, 1.0F);
-        if (pixel.is_ground) {
+        // Whoever sees water sees the ground.
+        if (pixel.is_ground || isReflection(pixel)) {
           shown.add(strip, 1.0F);
         } else if (pixel.is_other || pixel.is_changed) {
           other.add(strip, 1.0F);
@@ -196,7 +218,8 @@ GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, con
   const GroundMatch::Ground rays_to_ground = self.match.meet(ground);
   GroundAppearance appearance;
   if (const GroundView* before = self.viewBefore(stamp)) {
-    appearance.changed_fraction = self.compareWith(*before, rays_to_ground).changed;
+    appearance.changed_fraction =
+        self.compareWith(*before, rays_to_ground, GroundMatch::Reflections::kSought).changed;
   }
   if (ground.state == GroundState::kMeasured) {
     appearance.ground_pixels = self.groundPixels(rays_to_ground);
@@ -217,14 +240,15 @@ StandingAppearance GroundWatch::compareStanding(Timestamp stamp, const cv::Mat& 
   };
   const GroundView* before = self.viewBefore(stamp);
   if (before != nullptr) {
-    addChanges(self.compareWith(*before, level).changed);
+    addChanges(self.compareWith(*before, level, GroundMatch::Reflections::kIgnored).changed);
     if (before != &self.views.front()) {
-      addChanges(self.compareWith(self.views.front(), level).changed);
+      addChanges(self.compareWith(self.views.front(), level, GroundMatch::Reflections::kIgnored).changed);
     }
   }
   if (self.first_at_rest) {
     appearance.first = self.first_at_rest->stamp;
-    Implementation::Fractions fractions = self.compareWith(*self.first_at_rest, level);
+    Implementation::Fractions fractions =
+        self.compareWith(*self.first_at_rest, level, GroundMatch::Reflections::kIgnored);
     addChanges(fractions.changed);
     appearance.same_fraction = std::move(fractions.same);
   } else if (!self.stands_since) {

@@ -121,8 +121,9 @@ std::vector<JudgedPoint> ObjectCamera::judge(const PoseHistory& poses, MirrorEvi
       // Reflections in the ground move as static points below it do.
       const StaticResidual deeper = compareFrom(0.0);
       const double limit_rad = kMovingSigmas * sigma_rad_;
-      mirror->add(deeper.is_valid && deeper.residual_rad.norm() < limit_rad &&
-                  point.found.residual_rad.norm() > kReflected * limit_rad);
+      const bool is_reflection = deeper.is_valid && deeper.residual_rad.norm() < limit_rad &&
+                                 point.found.residual_rad.norm() > kReflected * limit_rad;
+      mirror->add(1, is_reflection ? 1 : 0);
       point.found = is_mirror && deeper.is_valid ? deeper : point.found;
     }
     if (!point.found.is_valid) {

@@ -9,12 +9,12 @@
 
 #include "bodies/body_stereo.h"
 #include "contacts/ground_contact.h"
+#include "light/mirror_evidence.h"
 #include "objects/freestanding.h"
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
 #include "objects/pose_history.h"
 #include "points/followed_points.h"
-#include "points/mirror_evidence.h"
 #include "points/panorama.h"
 #include "points/rotation_correction.h"
 #include "points/static_motion.h"

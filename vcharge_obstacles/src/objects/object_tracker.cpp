@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bodies/person_likeness.h"
+#include "light/mirror_evidence.h"
 #include "objects/freestanding.h"
 #include "objects/object_camera.h"
 #include "objects/object_detections.h"
@@ -12,7 +13,6 @@
 #include "objects/pose_history.h"
 #include "occupancy/known_obstacles.h"
 #include "points/followed_points.h"
-#include "points/mirror_evidence.h"
 #include "points/rotation_correction.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/frames/standstill.h"
@@ -22,6 +22,9 @@ namespace {
 
 // Deviation of the body's rotation from the odometer's that is estimated: braking pitches the body.
 constexpr double kBodyRotation_rad = 0.004;
+// Least part of the points below the horizon that move as if deeper than the ground if it mirrors. On one
+// simulated drive it is 0.07 to 0.14 in the wet, and at most 0.006 at noon.
+constexpr double kLeastMirror = 0.03;
 
 }  // namespace
 
@@ -29,7 +32,7 @@ struct ObjectTracker::State {
   PoseHistory poses;
   ObjectFilter filter;
   KnownObstacles obstacles;
-  MirrorEvidence mirror;
+  MirrorEvidence mirror{kLeastMirror};
 };
 
 ObjectTracker::ObjectTracker(std::shared_ptr<const CameraRig> rig, const ObjectTrackerOptions& options,

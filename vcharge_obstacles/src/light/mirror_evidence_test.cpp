@@ -1,34 +1,34 @@
-#include "points/mirror_evidence.h"
+#include "light/mirror_evidence.h"
 
 #include <gtest/gtest.h>
 
 namespace vcharge {
 namespace {
 
-void addImages(int count, int num_points, int num_below_ground, MirrorEvidence* evidence) {
+constexpr double kLeastPart = 0.03;
+
+void addImages(int count, size_t seen, size_t reflections, MirrorEvidence* evidence) {
   for (int image = 0; image < count; ++image) {
-    for (int i = 0; i < num_points; ++i) {
-      evidence->add(i < num_below_ground);
-    }
+    evidence->add(seen, reflections);
     evidence->endImage();
   }
 }
 
-TEST(MirrorEvidenceTest, FewPointsBelowTheGroundAreMoversByChance) {
-  MirrorEvidence evidence;
+TEST(MirrorEvidenceTest, FewReflectionsAreMoversByChance) {
+  MirrorEvidence evidence(kLeastPart);
   EXPECT_FALSE(evidence.isMirror());
   addImages(50, 1000, 6, &evidence);
   EXPECT_FALSE(evidence.isMirror());
 }
 
-TEST(MirrorEvidenceTest, ManyPointsBelowTheGroundTellThatItMirrors) {
-  MirrorEvidence evidence;
+TEST(MirrorEvidenceTest, ManyReflectionsTellThatItMirrors) {
+  MirrorEvidence evidence(kLeastPart);
   addImages(1, 1000, 70, &evidence);
   EXPECT_TRUE(evidence.isMirror());
 }
 
 TEST(MirrorEvidenceTest, StandingKeepsWhatWasSeenAndDryGroundEndsIt) {
-  MirrorEvidence evidence;
+  MirrorEvidence evidence(kLeastPart);
   addImages(1, 1000, 100, &evidence);
   addImages(1000, 0, 0, &evidence);
   EXPECT_TRUE(evidence.isMirror());
