@@ -11,10 +11,8 @@
 namespace vcharge {
 namespace {
 
-// Earlier images count less by a factor of e after this path and this turn.
-constexpr double kPath_m = 3.0, kTurn_rad = 0.15;
+constexpr double kFade_m = 3.0, kFade_rad = 0.15;
 constexpr double kMinPath_m = 0.5;
-constexpr double kMaxStep_m = 1.0;  // The path of one image counts up to this.
 // Added to gray levels before their logarithm, so that noise of dark pixels stays small.
 constexpr float kDark = 2.0F;
 constexpr double kMaxGround_m = 20.0;
@@ -47,7 +45,8 @@ cv::Mat boxMean(const cv::Mat& image, int side) {
 VehicleLight::VehicleLight(const MeiCamera& camera, const cv::Mat& valid_mask,
                            const RigidTransform& vehicle_from_camera)
     : ground_(cv::Mat::zeros(valid_mask.size(), CV_32FC1)),
-      motion_px_per_m_(cv::Mat::zeros(valid_mask.size(), CV_32FC1)) {
+      motion_px_per_m_(cv::Mat::zeros(valid_mask.size(), CV_32FC1)),
+      path_(kFade_m, kFade_rad) {
   constexpr double kStep_m = 0.01;
   const Eigen::Matrix3d rotation = vehicle_from_camera.rotationMatrix();
   for (int y = 0; y < valid_mask.rows; ++y) {
@@ -72,8 +71,7 @@ VehicleLight::VehicleLight(const MeiCamera& camera, const cv::Mat& valid_mask,
 
 void VehicleLight::clear() {
   mean_.release();
-  path_m_ = 0.0;
-  world_from_last_.reset();
+  path_.clear();
 }
 
 void VehicleLight::remember(const cv::Mat& log_image, double share) {
@@ -101,7 +99,7 @@ cv::Mat VehicleLight::correction() const {
   }
   const cv::Mat contrast = boxMean(light.mul(light), 7), texture = boxMean(variance_, 7);
   cv::Mat share(light.size(), CV_32FC1);
-  const auto path_m = static_cast<float>(path_m_);
+  const auto path_m = static_cast<float>(path_.length_m());
   constexpr auto kNoise_px = static_cast<float>(kSignificance * kIndependent_px);
   for (int y = 0; y < light.rows; ++y) {
     const auto* motion = motion_px_per_m_.ptr<float>(y);
@@ -136,18 +134,10 @@ cv::Mat VehicleLight::removeFrom(const cv::Mat& image, const RigidTransform& wor
     }
     return table;
   }();
-  double step_m = 0.0, rate = 0.0;
-  if (world_from_last_) {
-    const RigidTransform motion = world_from_last_->inverse() * world_from_camera;
-    step_m = std::min(motion.translation().norm(), kMaxStep_m);
-    rate = step_m / kPath_m + motion.rotation().angularDistance(Eigen::Quaterniond::Identity()) / kTurn_rad;
-  }
-  world_from_last_ = world_from_camera;
   cv::Mat log_image;
   cv::LUT(image, logarithms, log_image);
-  path_m_ = path_m_ * std::exp(-rate) + step_m;
-  remember(log_image, path_m_ > 0.0 ? step_m / path_m_ : 1.0);
-  if (path_m_ < kMinPath_m) {
+  remember(log_image, path_.moveTo(world_from_camera));
+  if (path_.length_m() < kMinPath_m) {
     return image;
   }
   const cv::Mat light = correction();

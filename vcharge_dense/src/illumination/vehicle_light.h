@@ -1,10 +1,9 @@
 #pragma once
 
-#include <optional>
-
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/camera/mei_camera.h"
+#include "vcharge_core/motion/fading_path.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -36,8 +35,7 @@ class VehicleLight {
   cv::Mat ground_around_;    // its mean around each pixel
   cv::Mat motion_px_per_m_;  // CV_32FC1: motion of the ground while the vehicle drives straight
   cv::Mat mean_, variance_;  // CV_32FC1: of logarithms
-  double path_m_ = 0.0;      // that mean_ covers
-  std::optional<RigidTransform> world_from_last_;
+  FadingPath path_;
 };
 
 }  // namespace vcharge

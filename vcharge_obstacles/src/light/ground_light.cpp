@@ -9,9 +9,7 @@ namespace vcharge {
 namespace {
 
 // Chosen on two simulated drives at dusk that are not used for evaluation.
-// Earlier images count less by a factor of e after this path.
-constexpr double kPath_m = 5.0;
-constexpr double kMaxStep_m = 1.0;  // The path of one image counts up to this.
+constexpr double kFade_m = 5.0;
 // Side of the smoothing window as a fraction of the image's width.
 constexpr double kSmoothing = 0.107;
 // Path after which the light is first used, and used in full.
@@ -21,6 +19,8 @@ constexpr double kLargestFactor = 3.0;
 constexpr float kGroundFall = 0.1F;
 
 }  // namespace
+
+GroundLight::GroundLight(const PixelRays& rays) : rays_(rays), path_(kFade_m) {}
 
 double GroundLight::meanOnGround() const {
   double sum = 0.0;
@@ -35,24 +35,20 @@ double GroundLight::meanOnGround() const {
 }
 
 cv::Mat GroundLight::even(const cv::Mat& image, const RigidTransform& fixed_from_vehicle) {
-  const double step_m =
-      fixed_from_last_
-          ? std::min(kMaxStep_m, (fixed_from_vehicle.translation() - fixed_from_last_->translation()).norm())
-          : 0.0;
-  fixed_from_last_ = fixed_from_vehicle;
   const int side = std::max(1, cvRound(kSmoothing * image.cols));
   cv::Mat smooth;
   cv::boxFilter(image, smooth, CV_32F, cv::Size(side, side));
-  path_m_ = path_m_ * std::exp(-step_m / kPath_m) + step_m;
+  const double share = path_.moveTo(fixed_from_vehicle);
   if (mean_.empty()) {
     mean_ = smooth;
-  } else if (step_m > 0.0) {
-    mean_ += (smooth - mean_) * (step_m / path_m_);
+  } else if (share > 0.0) {
+    mean_ += (smooth - mean_) * share;
   }
-  if (path_m_ <= kFrom_m) {
+  const double path_m = path_.length_m();
+  if (path_m <= kFrom_m) {
     return image;
   }
-  const double exponent = std::min(1.0, (path_m_ - kFrom_m) / (kFull_m - kFrom_m));
+  const double exponent = std::min(1.0, (path_m - kFrom_m) / (kFull_m - kFrom_m));
   cv::Mat factor = meanOnGround() / (mean_ + 1.0);
   factor = cv::max(cv::min(factor, kLargestFactor), 1.0 / kLargestFactor);
   cv::pow(factor, exponent, factor);
@@ -63,8 +59,7 @@ cv::Mat GroundLight::even(const cv::Mat& image, const RigidTransform& fixed_from
 
 void GroundLight::clear() {
   mean_.release();
-  path_m_ = 0.0;
-  fixed_from_last_.reset();
+  path_.clear();
 }
 
 }  // namespace vcharge

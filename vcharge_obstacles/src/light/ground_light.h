@@ -1,10 +1,9 @@
 #pragma once
 
-#include <optional>
-
 #include <opencv2/core.hpp>
 
 #include "detection/pixel_rays.h"
+#include "vcharge_core/motion/fading_path.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -16,7 +15,7 @@ namespace vcharge {
 class GroundLight {
  public:
   /// `rays` must outlive it.
-  explicit GroundLight(const PixelRays& rays) : rays_(rays) {}
+  explicit GroundLight(const PixelRays& rays);
 
   /// The image (CV_8UC1) as if the light known from it and the images before were even: gray levels are
   /// multiplied by 1/3 to 3. It sets in over 2.5 m of driving, as images that follow each other must agree.
@@ -29,9 +28,8 @@ class GroundLight {
   double meanOnGround() const;
 
   const PixelRays& rays_;
-  cv::Mat mean_;         // CV_32FC1
-  double path_m_ = 0.0;  // that mean_ covers
-  std::optional<RigidTransform> fixed_from_last_;
+  cv::Mat mean_;  // CV_32FC1
+  FadingPath path_;
 };
 
 }  // namespace vcharge
