@@ -37,8 +37,12 @@ vcharge_msgs::RigHealth toMessage(const RigMonitor& monitor) {
   for (size_t i = 0; i < monitor.rig().cameras.size(); ++i) {
     vcharge_msgs::CameraHealth camera;
     camera.camera = monitor.rig().cameras[i].name;
-    camera.state = moved.count(i) > 0 ? camera.MOVED : now.sees_little[i] ? camera.SEES_LITTLE : camera.OK;
+    camera.state = moved.count(i) > 0   ? camera.MOVED
+                   : now.sees_little[i] ? camera.SEES_LITTLE
+                   : now.is_dirty[i]    ? camera.DIRTY
+                                        : camera.OK;
     camera.sight = now.sight[i];
+    camera.dirt = now.dirt[i];
     camera.vehicle_from_camera = toTransformMessage(*monitor.rig().cameras[i].vehicle_from_camera);
     copyTo(now.deviation.segment<6>(RigDeviation::rowOf(i)), &camera.deviation);
     copyTo(now.sigmas.segment<6>(RigDeviation::rowOf(i)), &camera.standard_deviations);
@@ -69,6 +73,10 @@ DriveMonitor::Report toReport(const vcharge_msgs::RigHealth& health) {
     if (camera.state == camera.SEES_LITTLE) {
       report.level = DriveMonitor::Level::kWarn;
       report.message = "camera " + camera.camera + " sees little: its lens is dirty, covered or blinded";
+    }
+    if (camera.state == camera.DIRTY) {
+      report.level = DriveMonitor::Level::kWarn;
+      report.message = "camera " + camera.camera + " has dirt on its lens";
     }
     const double turn_rad = std::hypot(camera.deviation[3], camera.deviation[4], camera.deviation[5]);
     const double shift_m = std::hypot(camera.deviation[0], camera.deviation[1], camera.deviation[2]);

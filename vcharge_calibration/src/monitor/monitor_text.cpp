@@ -91,12 +91,14 @@ MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const std::vector<
   double seen_m = 0.0;
   std::vector<double> dim_m(monitor.rig().cameras.size(), 0.0);
   std::vector<bool> sees_little(dim_m.size(), false);
+  std::vector<double> dirt(dim_m.size(), 0.0);
   for (const MonitoredPart& part : monitor.parts()) {
     const double length_m = part.end_m - part.begin_m;
     seen_m += length_m;
     for (size_t i = 0; i < dim_m.size(); ++i) {
       dim_m[i] += part.sight[i] < kMinSight ? length_m : 0.0;
       sees_little[i] = sees_little[i] || part.sees_little[i];
+      dirt[i] = part.is_dirty[i] ? std::max(dirt[i], part.dirt[i]) : dirt[i];
     }
   }
   if (!(seen_m > 0.0)) {
@@ -110,6 +112,11 @@ MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const std::vector<
     if (sees_little[i]) {
       verdict.remarks.push_back("camera " + monitor.rig().cameras[i].name + " saw little over " +
                                 toText(dim_m[i], 0) + " m: its lens is dirty, covered or blinded");
+    }
+    if (dirt[i] > 0.0) {
+      verdict.remarks.push_back("camera " + monitor.rig().cameras[i].name +
+                                " has dirt on its lens: spots hide " + toText(100.0 * dirt[i], 1) +
+                                " % of the ground that it sees");
     }
   }
   if (monitor.pitchResponse().isSoft()) {

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "monitor/camera_sight.h"
+#include "monitor/lens_dirt.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/motion/pose_step.h"
 #include "vcharge_reconstruction/frame_follower.h"
@@ -19,6 +20,10 @@ namespace {
 constexpr double kPart_m = 10.0;
 /// A camera that sees little for a shorter distance passes something without texture.
 constexpr double kMinDim_m = 25.0;
+/// Spots on a lens that hide this part of the ground are dirt if they are there after so many parts. On
+/// simulated drives with clean lenses it is below 0.0001.
+constexpr double kDirt = 0.005;
+constexpr int kDirtyParts = 2;
 
 const CameraRig& withExtrinsics(const std::shared_ptr<const CameraRig>& rig) {
   check(rig != nullptr, "RigMonitor: expected a rig");
@@ -34,17 +39,25 @@ struct RigMonitor::Drive {
   ReconstructionState state;
   KeyframeImages images = KeyframeImages::ofAllKeyframes();
   std::vector<double> level_sums;  ///< of the keyframes' images, by camera
+  std::vector<double> dirt;        ///< of the lenses at the end, by camera
   FrameFollower follower;
 
-  Drive(const RigCalibratorOptions& options, const std::shared_ptr<const CameraRig>& rig)
+  Drive(const RigCalibratorOptions& options, const std::shared_ptr<const CameraRig>& rig,
+        std::vector<LensDirt>* lenses)
       : state(stateOf(rig)),
         level_sums(rig->cameras.size(), 0.0),
-        follower(options, std::nullopt, &state, [this](int32_t keyframe, const std::vector<Image>& pictures) {
-          images.add(keyframe, pictures);
-          for (size_t i = 0; i < pictures.size(); ++i) {
-            level_sums[i] += pictures[i].pixels.empty() ? 0.0 : cv::mean(pictures[i].pixels)[0];
-          }
-        }) {}
+        follower(options, std::nullopt, &state,
+                 [this, lenses](int32_t keyframe, const std::vector<Image>& pictures) {
+                   images.add(keyframe, pictures);
+                   const RigidTransform& pose =
+                       state.data.keyframes[static_cast<size_t>(keyframe)].odom_from_vehicle;
+                   for (size_t i = 0; i < pictures.size(); ++i) {
+                     if (!pictures[i].pixels.empty()) {
+                       level_sums[i] += cv::mean(pictures[i].pixels)[0];
+                       (*lenses)[i].add(pictures[i].pixels, pose);
+                     }
+                   }
+                 }) {}
 
   static ReconstructionState stateOf(const std::shared_ptr<const CameraRig>& rig) {
     ReconstructionState state;
@@ -65,7 +78,9 @@ RigMonitor::RigMonitor(std::shared_ptr<const CameraRig> rig, const RigCalibrator
       on_part_(std::move(on_part)),
       detector_(withExtrinsics(rig_), options_.false_alarms_per_km),
       sight_(std::make_unique<CameraSight>(rig_->cameras.size())),
-      dim_m_(rig_->cameras.size(), 0.0) {
+      lenses_(rig_->cameras.begin(), rig_->cameras.end()),
+      dim_m_(rig_->cameras.size(), 0.0),
+      dirty_parts_(rig_->cameras.size(), 0) {
   calibration_.validate();
   options_.validate();
   startPart();
@@ -74,7 +89,7 @@ RigMonitor::RigMonitor(std::shared_ptr<const CameraRig> rig, const RigCalibrator
 RigMonitor::~RigMonitor() = default;
 
 void RigMonitor::startPart() {
-  drive_ = std::make_unique<Drive>(calibration_, rig_);
+  drive_ = std::make_unique<Drive>(calibration_, rig_, &lenses_);
 }
 
 void RigMonitor::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
@@ -105,6 +120,9 @@ void RigMonitor::endPart() {
   if (drive_->state.data.keyframes.empty()) {
     return;
   }
+  for (const LensDirt& lens : lenses_) {
+    drive_->dirt.push_back(lens.part());
+  }
   waitForEndedPart();
   ended_ = std::move(drive_);
   adjustment_ = std::async(std::launch::async, [this] { adjustEndedPart(); });
@@ -129,6 +147,7 @@ void RigMonitor::adjustEndedPart() {
   for (size_t i = 0; i < rig_->cameras.size(); ++i) {
     seen.push_back({deviation.num_observations[i], ended_->level_sums[i] / num_keyframes});
   }
+  part.dirt = ended_->dirt;
   part.sight = sight_->add(seen, part.end_m - part.begin_m);
   for (size_t i = 0; i < part.sight.size(); ++i) {
     const bool is_dim = part.sight[i] < kMinSight;
@@ -137,6 +156,8 @@ void RigMonitor::adjustEndedPart() {
     if (is_dim) {
       forgetCamera(i, &deviation);
     }
+    dirty_parts_[i] = ended_->dirt[i] >= kDirt ? dirty_parts_[i] + 1 : 0;
+    part.is_dirty.push_back(dirty_parts_[i] >= kDirtyParts);
   }
   pitch_ += deviation.pitch;
   part.change = detector_.add(deviation);

@@ -26,7 +26,7 @@ std::string tableOf(const RigMonitor& monitor) {
     }
   }
   for (const RigCamera& camera : monitor.rig().cameras) {
-    text << ",sight of " << camera.name;
+    text << ",sight of " << camera.name << ",dirt of " << camera.name;
   }
   for (const MonitoredPart& part : monitor.parts()) {
     text << "\n" << part.end_m << "," << toString(part.end);
@@ -35,8 +35,8 @@ std::string tableOf(const RigMonitor& monitor) {
         text << "," << values[i];
       }
     }
-    for (const double value : part.sight) {
-      text << "," << value;
+    for (size_t i = 0; i < part.sight.size(); ++i) {
+      text << "," << part.sight[i] << "," << part.dirt[i];
     }
   }
   return text.str() + "\n";

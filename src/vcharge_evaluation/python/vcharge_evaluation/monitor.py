@@ -162,7 +162,7 @@ def suspension(args, results):
 def lens(args, results):
     """The left lens gets dirty."""
     told_as(args, results, "A lens gets dirty", ("--set", "faults.dirty_lens.cameras=[left]", "--set",
-                                                 f"faults.dirty_lens.start_s={KNOCK_S}"), remark="camera left saw little")
+                                                 f"faults.dirty_lens.start_s={KNOCK_S}"), remark="camera left has dirt on its lens")
 
 
 def main():

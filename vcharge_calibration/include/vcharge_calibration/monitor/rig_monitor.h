@@ -17,6 +17,7 @@
 namespace vcharge {
 
 class CameraSight;
+class LensDirt;
 
 struct RigMonitorOptions {
   VCHARGE_BEGIN_OPTIONS(RigMonitorOptions);
@@ -36,6 +37,10 @@ struct MonitoredPart {
   std::vector<double> sight;
   /// Cameras that saw too little all the way for some time: their lenses are dirty, covered or blinded.
   std::vector<bool> sees_little;
+  /// Part of the ground that each camera could see which spots on its lens hide, and cameras for which that
+  /// has been much for some time.
+  std::vector<double> dirt;
+  std::vector<bool> is_dirty;
   std::optional<RigChange> change;  ///< that this part made certain
 };
 
@@ -95,11 +100,13 @@ class RigMonitor : public DriveConsumer {
   const PartCallback on_part_;
   RigChangeDetector detector_;
   std::unique_ptr<CameraSight> sight_;
+  std::vector<LensDirt> lenses_;
   std::unique_ptr<Drive> drive_, ended_;
   std::vector<MonitoredPart> parts_;
   std::vector<RigAdoption> adoptions_;
   PitchResponse pitch_;
   std::vector<double> dim_m_;     ///< by camera, driven since it sees too little
+  std::vector<int> dirty_parts_;  ///< by camera, since its lens is dirty
   std::future<void> adjustment_;  ///< of ended_; destroyed first, since it uses the others
 };
 
