@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "ground/plane_fit.h"
+#include "light/ground_reflection.h"
 #include "vcharge_core/base/quantile.h"
 #include "vcharge_core/base/wide_loops.h"
 
@@ -91,8 +92,7 @@ GroundMatch::GroundMatch(const WorkingCamera& camera, const RigidTransform& vehi
       size_(camera.size()),
       rays_(rays),
       min_difference_(static_cast<float>(min_difference)),
-      warp_(camera.model(), innerPixels(camera)),
-      reflection_(warp_) {}
+      warp_(camera.model(), innerPixels(camera)) {}
 
 /// Pixels of the newer image that matter, and the points of the ground that they show.
 struct GroundMatch::Band {
@@ -101,10 +101,10 @@ struct GroundMatch::Band {
   PixelPoints ground;        // of the inner ones
 };
 
-/// Brightness in a band's rows.
+/// The older image in a band's rows, as if it showed the ground.
 struct GroundMatch::Compared {
-  const cv::Mat &here, &on_ground, &knows_ground;
-  float gain;  // by which the older image has to be multiplied
+  const cv::Mat &on_ground, &knows_ground;
+  float gain;  // by which it has to be multiplied
 };
 
 GroundMatch::Ground GroundMatch::meet(const GroundPlane& plane) const {
@@ -210,7 +210,7 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
                       fit.data[in_rows] == PlaneFit::kOther, differs, has_texture, 1.0F});
   }
   if (reflections == Reflections::kSought) {
-    seekReflections(now, before, band, {here, on_ground, knows_ground, gain}, &result);
+    seekReflections(now, before, band, {on_ground, knows_ground, gain}, &result);
   }
   return result;
 }
@@ -229,10 +229,10 @@ void GroundMatch::seekReflections(const GroundView& now, const GroundView& befor
     return;
   }
   cv::Mat difference;
-  cv::addWeighted(compared.here, 1.0, compared.on_ground, -compared.gain, 0.0, difference, CV_32F);
+  cv::addWeighted(now.smooth(band.rows), 1.0, compared.on_ground, -compared.gain, 0.0, difference, CV_32F);
   difference.setTo(cv::Scalar(0.0), compared.knows_ground == 0);
-  const cv::Mat unexplained = reflection_.unexplained(
-      {now.smooth, now.fixed_from_body * vehicle_from_camera_},
+  const cv::Mat unexplained = unexplainedByReflection(
+      warp_, {now.smooth, now.fixed_from_body * vehicle_from_camera_},
       {before.smooth, before.fixed_from_body * vehicle_from_camera_},
       {band.rows, band.ground, now.fixed_from_body, difference, compared.gain}, asked);
   for (MatchedPixel& pixel : *pixels) {

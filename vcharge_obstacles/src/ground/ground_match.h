@@ -8,7 +8,6 @@
 
 #include "detection/pixel_rays.h"
 #include "ground/point_warp.h"
-#include "light/ground_reflection.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/motion/rigid_transform.h"
@@ -70,7 +69,6 @@ class GroundMatch {
 
  private:
   struct Band;
-
   struct Compared;
 
   Band pixelsIn(const Ground& ground, double near_m, double far_m) const;
@@ -82,7 +80,6 @@ class GroundMatch {
   const PixelRays& rays_;
   const float min_difference_;
   const PointWarp warp_;
-  const GroundReflection reflection_;
 };
 
 }  // namespace vcharge

@@ -81,8 +81,8 @@ struct MirrorRays {
 
 }  // namespace
 
-cv::Mat GroundReflection::unexplained(const View& now, const View& before, const Pixels& ground,
-                                      const cv::Mat& asked) const {
+cv::Mat unexplainedByReflection(const PointWarp& warp, const LevelView& now, const LevelView& before,
+                                const ComparedGround& ground, const cv::Mat& asked) {
   const cv::Rect& rows = ground.rows;
   const int first_pixel = rows.y * rows.width, wide = rows.width + 2 * kReach_px;
   const auto inBorder = [&](int pixel) {
@@ -111,9 +111,9 @@ cv::Mat GroundReflection::unexplained(const View& now, const View& before, const
       }
     }
   }
-  const auto lookUp = [&](const View& view, const PixelPoints& rays, float inverse_range) {
-    return warp_.warp(view.image, view.level_from_camera.inverse(), now.level_from_camera.translation(), rays,
-                      inverse_range, rows);
+  const auto lookUp = [&](const LevelView& view, const PixelPoints& rays, float inverse_range) {
+    return warp.warp(view.image, view.level_from_camera.inverse(), now.level_from_camera.translation(), rays,
+                     inverse_range, rows);
   };
   cv::Mat change = cv::Mat::zeros(difference.size(), CV_32FC1), motion = change.clone();
   for (const float part : kRangeParts) {

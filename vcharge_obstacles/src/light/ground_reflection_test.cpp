@@ -92,8 +92,8 @@ class GroundReflectionTest : public ::testing::Test {
     cv::Mat difference;
     cv::subtract(now, warped.image, difference, warped.known, CV_32F);
     const cv::Mat asked = cv::abs(difference) >= 8.0;
-    const cv::Mat unexplained = GroundReflection(warp_).unexplained(
-        {now, now_}, {before, before_}, {rows_, points, RigidTransform(), difference, 1.0F}, asked);
+    const cv::Mat unexplained = unexplainedByReflection(
+        warp_, {now, now_}, {before, before_}, {rows_, points, RigidTransform(), difference, 1.0F}, asked);
     EXPECT_EQ(cv::countNonZero((unexplained < 1.0F) & (asked == 0)), 0);
     EXPECT_GE(cv::countNonZero(asked), 300);
     return static_cast<double>(cv::countNonZero(unexplained < 0.5F)) / cv::countNonZero(asked);
