@@ -16,9 +16,8 @@ constexpr int kMargin_px = 2;
 constexpr double kGroundFall = 0.08;
 // Angle between a spot and the ground beside it.
 constexpr double kBeside_rad = 0.244;
-// Images count less by a factor of e after this path. One that follows sooner than the least step is left
-// out, and none counts more than the largest.
-constexpr double kFade_m = 30.0, kLeastStep_m = 0.3, kLargestStep_m = 1.0;
+// An image that follows sooner is left out.
+constexpr double kLeastStep_m = 0.3;
 // Path of a direction that counts, and of all directions in which a spot must be seen.
 constexpr double kDirection_m = 5.0, kSeen_m = 15.0;
 // Least part of the path in which a spot must be seen.
@@ -79,30 +78,25 @@ LensDirt::LensDirt(const RigCamera& camera) : camera_(workingCamera(camera)) {
 }
 
 void LensDirt::add(const cv::Mat& pixels, const RigidTransform& odom_from_vehicle) {
-  double step_m = 0.0;
-  if (odom_from_last_) {
-    step_m = (odom_from_vehicle.translation() - odom_from_last_->translation()).norm();
-    if (step_m < kLeastStep_m) {
-      return;
-    }
-    step_m = std::min(step_m, kLargestStep_m);
+  if (odom_from_last_ &&
+      (odom_from_vehicle.translation() - odom_from_last_->translation()).norm() < kLeastStep_m) {
+    return;
   }
   odom_from_last_ = odom_from_vehicle;
-  for (Direction& direction : directions_) {
-    direction.path_m *= std::exp(-step_m / kFade_m);
-  }
   const double turn = (yawOfRotation(odom_from_vehicle.rotation()) + M_PI) / (2.0 * M_PI);
-  Direction& direction = directions_[static_cast<size_t>(turn * kNumDirections) % kNumDirections];
-  direction.path_m += step_m;
+  Direction& current = directions_[static_cast<size_t>(turn * kNumDirections) % kNumDirections];
+  double share = 0.0;
+  for (Direction& direction : directions_) {
+    share += direction.path.moveTo(odom_from_vehicle, &direction == &current);
+  }
   const cv::Mat image = logarithm(camera_.undistort(pixels));
-  if (direction.mean.empty()) {
-    direction.mean = image;
-    direction.variance = cv::Mat::zeros(image.size(), CV_32FC1);
+  if (current.mean.empty()) {
+    current.mean = image;
+    current.variance = cv::Mat::zeros(image.size(), CV_32FC1);
   } else {
-    const double share = step_m / direction.path_m;
-    const cv::Mat difference = image - direction.mean;
-    direction.mean += share * difference;
-    direction.variance += share * (difference.mul(difference) - direction.variance);
+    const cv::Mat difference = image - current.mean;
+    current.mean += share * difference;
+    current.variance += share * (difference.mul(difference) - current.variance);
   }
 }
 
@@ -112,7 +106,7 @@ int LensDirt::spotOf(const Direction& direction, const GroundPixel& pixel) const
   const auto* variance = direction.variance.ptr<float>();
   const float left = mean[pixel.here] - mean[pixel.left], right = mean[pixel.here] - mean[pixel.right];
   const float contrast = std::min(std::abs(left), std::abs(right));
-  const auto num_images = static_cast<float>(std::max(1.0, direction.path_m / kIndependent_m));
+  const auto num_images = static_cast<float>(std::max(1.0, direction.path.length_m() / kIndependent_m));
   const float noise =
       (variance[pixel.here] + 0.5F * (variance[pixel.left] + variance[pixel.right])) / num_images;
   if (left * right <= 0.0F || contrast < kContrast || contrast * contrast < kSigmas * kSigmas * noise) {
@@ -125,9 +119,9 @@ double LensDirt::part() const {
   std::vector<const Direction*> driven;
   double path_m = 0.0;
   for (const Direction& direction : directions_) {
-    if (direction.path_m >= kDirection_m) {
+    if (direction.path.length_m() >= kDirection_m) {
       driven.push_back(&direction);
-      path_m += direction.path_m;
+      path_m += direction.path.length_m();
     }
   }
   if (driven.size() < 2 || ground_.empty()) {
@@ -141,7 +135,7 @@ double LensDirt::part() const {
     for (const Direction* direction : driven) {
       const int spot = spotOf(*direction, pixel);
       if (spot != 0) {
-        seen_m[spot > 0 ? 1 : 0] += direction->path_m;
+        seen_m[spot > 0 ? 1 : 0] += direction->path.length_m();
         ++seen_in[spot > 0 ? 1 : 0];
       }
     }

@@ -9,6 +9,7 @@
 
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/camera/working_camera.h"
+#include "vcharge_core/motion/fading_path.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -34,12 +35,14 @@ class LensDirt {
   struct GroundPixel {
     int32_t here, left, right;
   };
+  static constexpr size_t kNumDirections = 6;
+  static constexpr double kFade_m = 30.0;
+
   /// Images of one direction of travel.
   struct Direction {
-    double path_m = 0.0;
+    FadingPath path{kFade_m};
     cv::Mat mean, variance;  ///< CV_32FC1, of logarithms; empty before the first image
   };
-  static constexpr size_t kNumDirections = 6;
 
   int spotOf(const Direction& direction, const GroundPixel& pixel) const;
 

@@ -11,15 +11,18 @@ constexpr double kMaxStep_m = 1.0;
 
 }  // namespace
 
-double FadingPath::moveTo(const RigidTransform& fixed_from_camera) {
+double FadingPath::moveTo(const RigidTransform& fixed_from_body, bool counts) {
   double step_m = 0.0;
   if (fixed_from_last_) {
-    const RigidTransform motion = fixed_from_last_->inverse() * fixed_from_camera;
+    const RigidTransform motion = fixed_from_last_->inverse() * fixed_from_body;
     step_m = std::min(kMaxStep_m, motion.translation().norm());
     const double turn_rad = motion.rotation().angularDistance(Eigen::Quaterniond::Identity());
-    length_m_ = length_m_ * std::exp(-step_m / fade_m_ - turn_rad / fade_rad_) + step_m;
+    length_m_ = length_m_ * std::exp(-step_m / fade_m_ - turn_rad / fade_rad_) + (counts ? step_m : 0.0);
   }
-  fixed_from_last_ = fixed_from_camera;
+  fixed_from_last_ = fixed_from_body;
+  if (!counts) {
+    return 0.0;
+  }
   return length_m_ > 0.0 ? step_m / length_m_ : 1.0;
 }
 

@@ -40,6 +40,14 @@ TEST(FadingPathTest, TurnsFadeToo) {
   EXPECT_NEAR(path.length_m(), std::exp(-2.0), 1e-12);
 }
 
+TEST(FadingPathTest, ImagesThatDoNotCountFadeTheOthers) {
+  FadingPath path(4.0);
+  path.moveTo(poseAt(0.0));
+  path.moveTo(poseAt(1.0));
+  EXPECT_EQ(path.moveTo(poseAt(2.0), false), 0.0);
+  EXPECT_NEAR(path.length_m(), std::exp(-0.25), 1e-12);
+}
+
 TEST(FadingPathTest, OneImageAfterAGapDoesNotOutweighAllOthers) {
   FadingPath path(5.0);
   path.moveTo(poseAt(0.0));
