@@ -49,6 +49,22 @@ Eigen::VectorXd CameraModel::parameters() const {
   return visit([](const auto& model) { return Eigen::VectorXd(model.parameters()); });
 }
 
+Eigen::Vector2d CameraModel::principalPoint() const {
+  Eigen::Vector2d pixel;
+  project(Eigen::Vector3d(Eigen::Vector3d::UnitZ()), &pixel);
+  return pixel;
+}
+
+CameraModel CameraModel::withImage(double magnification, const Eigen::Vector2d& shift_px) const {
+  return visit([&](const auto& model) -> CameraModel {
+    using Model = std::decay_t<decltype(model)>;
+    typename Model::Parameters values = model.parameters();
+    values.template segment<2>(Model::kFocalLengths) *= magnification;
+    values.template segment<2>(Model::kFocalLengths + 2) += shift_px;
+    return Model(values);
+  });
+}
+
 void CameraModel::project(const Eigen::Matrix3Xd& points_in_camera, Eigen::Matrix2Xd* pixels,
                           std::vector<uint8_t>* valid) const {
   pixels->setZero(2, points_in_camera.cols());

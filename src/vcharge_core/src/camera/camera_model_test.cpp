@@ -185,6 +185,20 @@ TEST_P(CameraModelTest, IsRebuiltFromItsNameAndParameters) {
 INSTANTIATE_TEST_SUITE_P(AllModels, CameraModelTest, ::testing::ValuesIn(testCameras()),
                          [](const auto& test) { return test.param.label; });
 
+TEST_P(CameraModelTest, MagnifiesAndShiftsTheImage) {
+  const auto& [label, camera, max_angle_rad] = GetParam();
+  const CameraModel moved = camera.withImage(1.01, Eigen::Vector2d(3.0, -2.0));
+  EXPECT_EQ(moved.name(), camera.name());
+  EXPECT_LT((moved.principalPoint() - camera.principalPoint() - Eigen::Vector2d(3.0, -2.0)).norm(), 1e-9);
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d ray = direction(0.8 * max_angle_rad, 0.8 * i);
+    Eigen::Vector2d before, after;
+    ASSERT_TRUE(camera.project(ray, &before) && moved.project(ray, &after)) << label;
+    const Eigen::Vector2d expected = 1.01 * (before - camera.principalPoint());
+    EXPECT_LT((after - moved.principalPoint() - expected).norm(), 1e-9) << label;
+  }
+}
+
 TEST(CameraModelCreateTest, RejectsUnknownModels) {
   EXPECT_THROW(CameraModel::create("fisheye", Eigen::VectorXd::Ones(9)), std::invalid_argument);
 }

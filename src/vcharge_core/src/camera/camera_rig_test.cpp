@@ -93,11 +93,21 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   rig.cameras[0].mask = cv::Mat(800, 1280, CV_8UC1, cv::Scalar(255));
   rig.cameras[0].mask.at<uint8_t>(3, 4) = 0;
   rig.scale_sigma = 0.1 / 3.0;
+  rig.cameras[0].focal_sigma = 1e-4 / 3.0;
+  rig.cameras[0].principal_point_sigma_px = 0.1 / 3.0;
+  rig.cameras[0].timing = {0.02 / 3.0, ReadoutDirection::kLeft, -0.01 / 3.0};
   rig.provenance = {{"bag", "a: \"b\" # c.bag"}, {"options", "{a: 1,\n b: [2]}"}, {"verdict", "yes"}};
   writeCameraRig(rig, folder + "/rig.yaml");
   const CameraRig read = readCameraRig(folder + "/rig.yaml");
   EXPECT_EQ(read.provenance, rig.provenance);
   EXPECT_EQ(read.scale_sigma, rig.scale_sigma);
+  EXPECT_EQ(read.cameras[0].focal_sigma, rig.cameras[0].focal_sigma);
+  EXPECT_EQ(read.cameras[0].principal_point_sigma_px, rig.cameras[0].principal_point_sigma_px);
+  EXPECT_EQ(read.cameras[1].focal_sigma, 0.0);
+  EXPECT_EQ(read.cameras[0].timing.readout_s, rig.cameras[0].timing.readout_s);
+  EXPECT_EQ(read.cameras[0].timing.readout_direction, ReadoutDirection::kLeft);
+  EXPECT_EQ(read.cameras[0].timing.clock_offset_s, rig.cameras[0].timing.clock_offset_s);
+  EXPECT_TRUE(read.cameras[1].timing.isInstant());
   EXPECT_EQ(read.cameras[0].model.parameters(), rig.cameras[0].model.parameters());
   EXPECT_EQ(read.cameras[0].vehicle_from_camera->translation(),
             rig.cameras[0].vehicle_from_camera->translation());
@@ -108,6 +118,21 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   EXPECT_EQ(*read.cameras[0].covariance, covariance);
   EXPECT_EQ(cv::norm(read.cameras[0].mask, rig.cameras[0].mask, cv::NORM_INF), 0.0);
   EXPECT_FALSE(read.cameras[1].vehicle_from_camera);
+}
+
+TEST(CameraRigTest, LinesAreExposedInTheirOrder) {
+  RigCamera camera = parseCameraRig(kRig, "rig.yaml", ".").cameras[0];  // 1280 x 800
+  EXPECT_EQ(camera.exposedAt({100.0, 700.0}), 0.0);
+  camera.timing.readout_s = 0.08;
+  camera.timing.clock_offset_s = 0.007;
+  EXPECT_NEAR(camera.exposedAt({100.0, -0.5}), 0.007 - 0.04, 1e-15);
+  EXPECT_NEAR(camera.exposedAt({100.0, 799.5}), 0.007 + 0.04, 1e-15);
+  camera.timing.readout_direction = ReadoutDirection::kUp;
+  EXPECT_NEAR(camera.exposedAt({100.0, 799.5}), 0.007 - 0.04, 1e-15);
+  camera.timing.readout_direction = ReadoutDirection::kRight;
+  EXPECT_NEAR(camera.exposedAt({319.5, 700.0}), 0.007 - 0.02, 1e-15);
+  camera.timing.readout_direction = ReadoutDirection::kLeft;
+  EXPECT_NEAR(camera.exposedAt({319.5, 700.0}), 0.007 + 0.02, 1e-15);
 }
 
 TEST(CameraRigTest, ScaleAddsToTheCovarianceAlongTheTranslation) {
@@ -151,6 +176,12 @@ TEST(CameraRigTest, EveryErrorNamesFileKeyAndExpectation) {
   EXPECT_THAT(errorOf(replaced(kRig, "[1280, 800]", "[1280, 800.5]")),
               HasSubstr("cameras.front.image_size_px"));
   EXPECT_THAT(errorOf(replaced(kRig, "3.2289", "-1")), HasSubstr("field_of_view_rad"));
+  EXPECT_THAT(errorOf(replaced(kRig, "field_of_view_rad: 3.2289", "readout_s: 22")),
+              AllOf(HasSubstr("cameras.front.readout_s"), HasSubstr("seconds from 0 to 0.2")));
+  EXPECT_THAT(errorOf(replaced(kRig, "field_of_view_rad: 3.2289", "readout_direction: top")),
+              AllOf(HasSubstr("cameras.front.readout_direction"), HasSubstr("up")));
+  EXPECT_THAT(errorOf(replaced(kRig, "field_of_view_rad: 3.2289", "clock_offset_s: 7")),
+              AllOf(HasSubstr("cameras.front.clock_offset_s"), HasSubstr("seconds from -1 to 1")));
   EXPECT_THAT(errorOf(replaced(kRig, "rear:", "front:")), HasSubstr("twice"));
   EXPECT_THAT(
       errorOf(replaced(kRig, "    vehicle_from_camera:", "    mask: none.png\n    vehicle_from_camera:")),

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <vector>
 
 namespace vcharge {
 namespace {
@@ -80,8 +81,12 @@ void DriveOdometry::clear() {
 void DriveOdometry::setTrajectory(const Trajectory& odom_from_vehicle) {
   buffer_options_.history_s = std::numeric_limits<double>::infinity();
   clear();
+  std::vector<VehicleOdometry> poses;
   for (const StampedTransform& stamped : odom_from_vehicle) {
-    const VehicleOdometry odometry{stamped.stamp, stamped.world_from_vehicle};
+    poses.push_back({stamped.stamp, stamped.world_from_vehicle});
+  }
+  fillVelocities(&poses);
+  for (const VehicleOdometry& odometry : poses) {
     raw_.add(odometry);
     bridged_.add(odometry);
   }

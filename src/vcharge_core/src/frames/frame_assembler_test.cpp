@@ -253,7 +253,21 @@ TEST_F(FrameAssemblerTest, TakesPosesFromATrajectory) {
   send(0.3, {0, 1, 2});
   ASSERT_EQ(frames_.size(), 2u);
   EXPECT_NEAR(frames_[0].odom_from_vehicle->translation().x(), 1.0, 1e-9);
+  EXPECT_NEAR(frames_[0].rates.forward_speed_m_per_s, 10.0, 1e-9);
   EXPECT_FALSE(frames_[1].odom_from_vehicle.has_value());
+}
+
+TEST_F(FrameAssemblerTest, TakesRatesFromTheOdometry) {
+  for (const double time_s : {0.0, 0.2}) {
+    VehicleOdometry odometry = odometryAt(time_s, 0.0);
+    odometry.forward_speed_m_per_s = 3.0 + time_s;
+    odometry.yaw_rate_rad_per_s = -0.4;
+    assembler_.addOdometry(odometry);
+  }
+  send(0.1, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 1u);
+  EXPECT_NEAR(frames_[0].rates.forward_speed_m_per_s, 3.1, 1e-9);
+  EXPECT_NEAR(frames_[0].rates.yaw_rate_rad_per_s, -0.4, 1e-9);
 }
 
 TEST_F(FrameAssemblerTest, AReplayStartsOver) {

@@ -6,6 +6,12 @@
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
+namespace {
+
+/// A larger step back of stamps is a replay.
+constexpr double kReplay_s = 1.0;
+
+}  // namespace
 
 MultiFrameSynchronizer::MultiFrameSynchronizer(size_t num_cameras,
                                                const MultiFrameSynchronizerOptions& options)
@@ -43,7 +49,7 @@ std::vector<std::shared_ptr<const MultiFrame>> MultiFrameSynchronizer::takeIncom
 std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_index, Timestamp stamp,
                                                               const Image& image) {
   check(camera_index < num_cameras_, "MultiFrameSynchronizer::add: camera index out of range");
-  if (newest_ && toSeconds(*newest_ - stamp) >= options_.reset_backwards_s) {
+  if (newest_ && toSeconds(*newest_ - stamp) >= kReplay_s) {
     while (!pending_.empty()) {
       giveUpOldest();
     }

@@ -105,9 +105,7 @@ TEST(MultiFrameSynchronizerTest, StartingOverGivesUpWhatWaits) {
 }
 
 TEST(MultiFrameSynchronizerTest, AStepBackThatIsNoRestartIsLate) {
-  MultiFrameSynchronizerOptions options;
-  options.reset_backwards_s = 1.0;
-  MultiFrameSynchronizer synchronizer(1, options);
+  MultiFrameSynchronizer synchronizer(1);
   EXPECT_NE(synchronizer.add(0, at(10.0), imageWith(0)), nullptr);
   EXPECT_EQ(synchronizer.add(0, at(9.5), imageWith(0)), nullptr);
   EXPECT_EQ(synchronizer.counts().late_images, 1U);
@@ -195,7 +193,6 @@ TEST(MultiFrameSynchronizerTest, RejectsBadOptionsByName) {
   EXPECT_THAT(errorOf([](auto* o) { o->tolerance_s = std::numeric_limits<double>::infinity(); }),
               StartsWith("tolerance_s: "));
   EXPECT_THAT(errorOf([](auto* o) { o->max_pending_sets = 0; }), StartsWith("max_pending_sets: "));
-  EXPECT_THAT(errorOf([&](auto* o) { o->reset_backwards_s = nan; }), StartsWith("reset_backwards_s: "));
 }
 
 TEST(MultiFrameSynchronizerTest, BadIndexIsACallersBug) {

@@ -12,6 +12,23 @@ constexpr double kResetBackwards_s = 1.0;
 
 }  // namespace
 
+void fillVelocities(std::vector<VehicleOdometry>* poses) {
+  for (size_t i = 0; i < poses->size(); ++i) {
+    const VehicleOdometry& before = (*poses)[i == 0 ? 0 : i - 1];
+    const VehicleOdometry& after = (*poses)[std::min(i + 1, poses->size() - 1)];
+    if (!(before.stamp < after.stamp)) {
+      continue;  // a single pose
+    }
+    const double time_s = toSeconds(after.stamp - before.stamp);
+    VehicleOdometry& pose = (*poses)[i];
+    const Eigen::Vector3d forward = pose.odom_from_vehicle.rotation() * Eigen::Vector3d::UnitX();
+    const RigidTransform before_from_after = before.odom_from_vehicle.inverse() * after.odom_from_vehicle;
+    pose.forward_speed_m_per_s =
+        forward.dot(after.odom_from_vehicle.translation() - before.odom_from_vehicle.translation()) / time_s;
+    pose.yaw_rate_rad_per_s = yawOfRotation(before_from_after.rotation()) / time_s;
+  }
+}
+
 OdometryBuffer::OdometryBuffer(const OdometryBufferOptions& options) : options_(options) {
   options_.validate();
 }

@@ -132,22 +132,6 @@ std::vector<VehicleOdometry> readPoses(const std::string& path, const RigidTrans
   return poses;
 }
 
-// Fills the velocities by central differences, one-sided at the ends.
-void fillVelocities(std::vector<VehicleOdometry>* poses) {
-  const size_t last = poses->size() - 1;
-  for (size_t i = 0; i <= last; ++i) {
-    const VehicleOdometry& before = (*poses)[i == 0 ? 0 : i - 1];
-    const VehicleOdometry& after = (*poses)[std::min(i + 1, last)];
-    const double time_s = toSeconds(after.stamp - before.stamp);
-    VehicleOdometry& pose = (*poses)[i];
-    const Eigen::Vector3d forward = pose.odom_from_vehicle.rotation() * Eigen::Vector3d::UnitX();
-    const RigidTransform before_from_after = before.odom_from_vehicle.inverse() * after.odom_from_vehicle;
-    pose.forward_speed_m_per_s =
-        forward.dot(after.odom_from_vehicle.translation() - before.odom_from_vehicle.translation()) / time_s;
-    pose.yaw_rate_rad_per_s = yawOfRotation(before_from_after.rotation()) / time_s;
-  }
-}
-
 std::vector<VchargeRecording::ImageFile> readImageList(const std::string& folder) {
   const std::string path = folder + "/images.txt";
   const std::vector<std::string> lines = readLines(path);

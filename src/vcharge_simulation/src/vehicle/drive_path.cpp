@@ -1,5 +1,5 @@
 #include "vcharge_simulation/vehicle/drive_path.h"
-#include "vcharge_wheel_odometry/wheel_motion.h"
+#include "vcharge_core/motion/vehicle_rates.h"
 
 #include <algorithm>
 #include <cmath>

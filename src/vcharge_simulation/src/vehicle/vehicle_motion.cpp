@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/motion/vehicle_rates.h"
 #include "vcharge_simulation/rendering/noise.h"
-#include "vcharge_wheel_odometry/wheel_motion.h"
 
 namespace vcharge {
 

@@ -45,8 +45,4 @@ struct WheelMotion {
 WheelMotion wheelMotion(const WheelMeasurement& before, const WheelMeasurement& now, double curvature_per_m,
                         const WheelOdometryOptions& options);
 
-/// Motion of the centre of the rear axle over `distance_m` along a circular arc that turns by `turn_rad`
-/// (positive to the left), starting along x. Exact, also for straight lines.
-RigidTransform arcMotion(double distance_m, double turn_rad);
-
 }  // namespace vcharge

@@ -20,7 +20,8 @@ namespace vcharge {
 /// pixel centres have integer coordinates. A value type. Visit the concrete model once per array of points,
 /// not per pixel:
 ///   camera.visit([&](const auto& model) { for (...) model.project(point, &pixel); });
-/// Every model has kNumParameters, kName, parameterNames(), parameters(), project() and unproject().
+/// Every model has kNumParameters, kFocalLengths, kName, parameterNames(), parameters(), project() and
+/// unproject().
 class CameraModel {
  public:
   using Variant = std::variant<MeiCamera, KannalaBrandtCamera, PinholeCamera>;
@@ -44,6 +45,11 @@ class CameraModel {
   std::string name() const;
   std::vector<std::string> parameterNames() const { return parameterNames(name()); }
   Eigen::VectorXd parameters() const;
+  /// Pixel of the optical axis.
+  Eigen::Vector2d principalPoint() const;
+  /// A camera of the same model whose image is that of this one, magnified `magnification` times about the
+  /// principal point and then shifted.
+  CameraModel withImage(double magnification, const Eigen::Vector2d& shift_px) const;
 
   /// Projects points in the camera frame (3 x N, any positive scale) to pixels; valid[i] is 0 where the model
   /// has no image of the point.

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/camera/camera_model.h"
+#include "vcharge_core/camera/image_timing.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -28,6 +29,16 @@ struct RigCamera {
   /// Covariance of vehicle_from_camera, over [dt, dphi] in the vehicle frame: t = t_hat + dt, R = Exp(dphi)
   /// R_hat; for a given scale of the rig, see CameraRig::scale_sigma.
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
+  // Standard deviations of the intrinsics: of the focal length, relative, and of the principal point. 0:
+  // unknown.
+  double focal_sigma = 0.0;
+  double principal_point_sigma_px = 0.0;
+  ImageTiming timing;
+
+  /// Exposure of a pixel after the image's stamp, on the vehicle's clock.
+  double exposedAt(const Eigen::Vector2d& position_px) const {
+    return timing.exposedAt(position_px, image_size_px);
+  }
 };
 
 /// True for a letter followed by letters, digits and underscores, since names become topics and files.

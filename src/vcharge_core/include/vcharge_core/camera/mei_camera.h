@@ -16,6 +16,7 @@ namespace vcharge {
 class MeiCamera {
  public:
   static constexpr int kNumParameters = 9;
+  static constexpr int kFocalLengths = 1;  ///< index of two focal lengths, followed by the principal point
   static constexpr const char* kName = "mei";
   using Parameters = Eigen::Matrix<double, kNumParameters, 1>;
   static constexpr std::array<const char*, kNumParameters> parameterNames() {

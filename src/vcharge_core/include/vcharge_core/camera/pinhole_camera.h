@@ -12,6 +12,7 @@ namespace vcharge {
 class PinholeCamera {
  public:
   static constexpr int kNumParameters = 8;
+  static constexpr int kFocalLengths = 0;  ///< index of two focal lengths, followed by the principal point
   static constexpr const char* kName = "pinhole";
   using Parameters = Eigen::Matrix<double, kNumParameters, 1>;
   static constexpr std::array<const char*, kNumParameters> parameterNames() {

@@ -44,6 +44,7 @@ struct AssembledFrame {
   std::optional<RigidTransform> odom_from_vehicle;
   /// Pose in a frame without jumps: resets of the odometer are bridged by the velocities before them.
   std::optional<RigidTransform> bridged_from_vehicle;
+  VehicleRates rates;  ///< where there is a pose
   /// Reason why there is no pose.
   OdometryBuffer::LookupStatus odometry_status = OdometryBuffer::LookupStatus::kEmpty;
   int64_t num_resets = 0;  ///< resets of the odometer before this frame
@@ -300,6 +301,7 @@ void FrameAssembler<ImageType>::handOutFirst() {
   frame.odometry_status = bridged.status;
   if (bridged) {
     frame.bridged_from_vehicle = bridged.odometry.odom_from_vehicle;
+    frame.rates = bridged.odometry.rates();
     if (const OdometryBuffer::Lookup raw = odometry_.lookup(frame.stamp)) {
       frame.odom_from_vehicle = raw.odometry.odom_from_vehicle;
       handed_out_.push_back(

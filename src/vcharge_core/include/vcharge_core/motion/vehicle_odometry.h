@@ -6,10 +6,12 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/vehicle_rates.h"
 
 namespace vcharge {
 
@@ -21,7 +23,12 @@ struct VehicleOdometry {
   RigidTransform odom_from_vehicle;
   double forward_speed_m_per_s = 0.0;
   double yaw_rate_rad_per_s = 0.0;
+
+  VehicleRates rates() const { return {forward_speed_m_per_s, yaw_rate_rad_per_s}; }
 };
+
+/// Fills the velocities of poses by central differences, one-sided at the ends.
+void fillVelocities(std::vector<VehicleOdometry>* poses);
 
 /// Raw counters of the rear wheels.
 struct WheelTicks {

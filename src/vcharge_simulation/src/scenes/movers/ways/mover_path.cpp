@@ -1,5 +1,5 @@
 #include "scenes/movers/ways/mover_path.h"
-#include "vcharge_wheel_odometry/wheel_motion.h"
+#include "vcharge_core/motion/vehicle_rates.h"
 
 #include <algorithm>
 #include <utility>

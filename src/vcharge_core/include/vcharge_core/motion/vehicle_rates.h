@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+/// Motion of the centre of the rear axle over `distance_m` along a circular arc that turns by `turn_rad`
+/// (positive to the left), starting along x. Exact, also for straight lines.
+RigidTransform arcMotion(double distance_m, double turn_rad);
+
+/// Motion of the vehicle around an instant: along a circular arc at constant speed.
+struct VehicleRates {
+  double forward_speed_m_per_s = 0.0;
+  double yaw_rate_rad_per_s = 0.0;
+
+  /// The rates of the motion from one pose to another in `time_s`.
+  static VehicleRates between(const RigidTransform& before_from_after, double time_s);
+  /// Pose of the vehicle a time after the instant, in its frame at the instant.
+  RigidTransform motionAfter(double time_s) const {
+    return arcMotion(forward_speed_m_per_s * time_s, yaw_rate_rad_per_s * time_s);
+  }
+  /// Velocity of a point that moves with the vehicle, in the vehicle's frame.
+  Eigen::Vector3d velocityOf(const Eigen::Vector3d& point_m) const {
+    return {forward_speed_m_per_s - yaw_rate_rad_per_s * point_m.y(), yaw_rate_rad_per_s * point_m.x(), 0.0};
+  }
+};
+
+}  // namespace vcharge
