@@ -287,11 +287,12 @@ class FaultsTest(unittest.TestCase):
                     f"faults.bumped_camera.rotation_rad=[0, 0, {angle_rad}]",
                     "faults.motion_blur.cameras=[front]", "faults.motion_blur.exposure_time_s=0.08",
                     "faults.rolling_shutter.cameras=[rear]", "faults.rolling_shutter.readout_time_s=0.03"]
-        status, _, errors = self.try_to_simulate("refused", settings, images_from=self.folder / "clean.bag")
-        self.assertNotEqual(status, 0)
-        self.assertIn("faults.bumped_camera", errors[0])
         self.simulate("rendered", settings, noise="off")
         recording = Recording(self.folder / "rendered.bag")
+        self.simulate("partly", settings, noise="off", images_from=self.folder / "clean.bag")
+        partly = Recording(self.folder / "partly.bag")
+        for camera in recording.images:
+            np.testing.assert_array_equal(list(partly.pixels(camera).values()), list(recording.pixels(camera).values()))
         self.assertEqual([fault["kind"] for fault in recording.faults], ["bumped_camera", "rolling_shutter", "motion_blur"])
         for stamp, pixels in recording.pixels("right").items():
             np.testing.assert_array_equal(pixels, self.clean.pixels("right")[stamp])
@@ -311,6 +312,12 @@ class FaultsTest(unittest.TestCase):
         self.assertAlmostEqual(2.0 * np.arccos(abs(before @ after)), angle_rad, places=6)
         for camera in ("front", "rear", "right"):
             self.assertEqual(rigs[0][camera]["vehicle_from_camera"], rigs[1][camera]["vehicle_from_camera"])
+
+    def test_images_that_are_all_changed_are_not_taken_from_another_drive(self):
+        status, _, errors = self.try_to_simulate("refused", ["faults.soft_suspension.pitch_factor=3"],
+                                                 images_from=self.folder / "clean.bag")
+        self.assertNotEqual(status, 0)
+        self.assertIn("faults.soft_suspension", errors[0])
 
     def turn_about_axis(self, before, after):
         """Rotation angle about the principal point that aligns the two images."""

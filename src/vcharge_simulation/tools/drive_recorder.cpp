@@ -41,6 +41,24 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
   return plan;
 }
 
+SceneOptions sceneOptionsOf(const DriveScenario& scenario, const DrivePlan& plan,
+                            const SimulatedDrive& drive) {
+  SceneOptions scene;
+  scene.seed = static_cast<uint64_t>(scenario.scene_seed);
+  scene.layout_seed = static_cast<uint64_t>(scenario.layout_seed);
+  scene.surface_seed = static_cast<uint64_t>(scenario.surface_seed);
+  scene.day = {scenario.day < 0 ? plan.day : scenario.day, scenario.exchanged_cars};
+  scene.condition = scenario.condition;
+  scene.image_scale = scenario.image_scale;
+  scene.board = scenario.board;
+  scene.rig = scenario.rig;
+  scene.rig_seed = static_cast<uint64_t>(scenario.rig_seed);
+  scene.movers = scenario.movers;
+  scene.own_poses = ownPoses(drive);
+  scene.start_s = plan.start_s;
+  return scene;
+}
+
 // Keeps every step-th element.
 template <class T>
 void thin(int step, std::vector<T>* list) {
@@ -51,21 +69,30 @@ void thin(int step, std::vector<T>* list) {
   *list = std::move(kept);
 }
 
-// These options need the renderer, so images rendered without them cannot be used.
+// These options change all images, so images rendered without them cannot be used.
 void checkImagesCanBeReused(const DriveScenario& scenario, const std::string& images_from) {
   const FaultOptions& faults = scenario.faults;
   const bool lamps_in_world = faults.bright_lamps.isActive() && !faults.bright_lamps.positions_m.empty();
   for (const auto& [name, is_active] :
-       {std::pair("faults.bumped_camera", faults.bumped_camera.isActive()),
-        std::pair("faults.rolling_shutter", faults.rolling_shutter.isActive()),
-        std::pair("faults.motion_blur", faults.motion_blur.isActive()),
+       {std::pair("faults.soft_suspension", faults.soft_suspension.isActive()),
+        std::pair("faults.loaded_boot", faults.loaded_boot.isActive()),
         std::pair("faults.bright_lamps.positions_m", lamps_in_world),
         std::pair("condition", !scenario.condition.isNoon())}) {
     if (is_active) {
-      throw InputError(std::string(name) + ": needs rendering, so the images of " + images_from +
+      throw InputError(std::string(name) + ": changes all images, so those of " + images_from +
                        " cannot be used");
     }
   }
+}
+
+// Whether a fault changes what is rendered for a camera at that time, or at any time.
+bool changesRendering(const FaultOptions& faults, const std::string& camera, Duration since_start) {
+  return faults.bumped_camera.actsOn(camera, since_start) ||
+         faults.rolling_shutter.actsOn(camera, since_start) || faults.motion_blur.actsOn(camera, since_start);
+}
+bool changesRendering(const FaultOptions& faults) {
+  return faults.bumped_camera.isActive() || faults.rolling_shutter.isActive() ||
+         faults.motion_blur.isActive();
 }
 
 // `to` is a point or, if w is 0, a direction.
@@ -168,21 +195,12 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   std::optional<LensGlare> glare;
   std::unique_ptr<ImageSource> images;
   writeTrajectory(drive.world_from_vehicle, truth.path() + "/trajectory.tum");
-  if (recording.images_from.empty()) {
-    SceneOptions scene;
-    scene.seed = static_cast<uint64_t>(scenario.scene_seed);
-    scene.layout_seed = static_cast<uint64_t>(scenario.layout_seed);
-    scene.surface_seed = static_cast<uint64_t>(scenario.surface_seed);
-    scene.day = {scenario.day < 0 ? plan.day : scenario.day, scenario.exchanged_cars};
-    scene.condition = scenario.condition;
-    scene.image_scale = scenario.image_scale;
-    scene.board = scenario.board;
-    scene.rig = scenario.rig;
-    scene.rig_seed = static_cast<uint64_t>(scenario.rig_seed);
-    scene.movers = scenario.movers;
-    scene.own_poses = ownPoses(drive);
-    scene.start_s = plan.start_s;
-    renderer.emplace(buildScene(scenario.scene, scene));
+  const bool is_rendered = recording.images_from.empty();
+  if (!is_rendered) {
+    checkImagesCanBeReused(scenario, recording.images_from);
+  }
+  if (is_rendered || changesRendering(faults)) {
+    renderer.emplace(buildScene(scenario.scene, sceneOptionsOf(scenario, plan, drive)));
     if (!scenario.condition.isNoon()) {
       glare.emplace(renderer->scene(), [&](const Eigen::Vector3d& from_m, const Eigen::Vector4d& to) {
         return isVisible(*renderer, from_m, to);
@@ -190,6 +208,8 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     }
     images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur,
                           glare ? &*glare : nullptr);
+  }
+  if (is_rendered) {
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, kHeightLimit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
@@ -197,13 +217,17 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
       writeMovers(renderer->scene().movers, stamps, scene_times_s, truth.path() + "/movers.yaml");
     }
   } else {
-    checkImagesCanBeReused(scenario, recording.images_from);
-    images = readImages(recording.images_from, rig, drive);
+    images = readImages(
+        recording.images_from, rig, drive,
+        [&](size_t camera, size_t frame) {
+          return changesRendering(faults, cameras.name(camera), stamps[frame] - start);
+        },
+        std::move(images));
   }
   if (scenario.scene == "chessboard") {
     writeTextFileAtomically(truth.path() + "/board.yaml", boardTarget(scenario.board));
   }
-  const bool has_objects = renderer && !trueObjects(renderer->scene().movers, 0.0).empty();
+  const bool has_objects = is_rendered && !trueObjects(renderer->scene().movers, 0.0).empty();
   const bool truth_range = recording.truth_range && renderer.has_value();
   for (const RigCamera& camera : rig.cameras) {
     if (truth_range) {

@@ -8,8 +8,9 @@ namespace vcharge {
 
 /// Outputs of simulate_drive.
 struct RecordingOptions {
-  std::string bag;          ///< bag to write; rig_truth.yaml and the folder BAG_truth are written beside it
-  std::string images_from;  ///< noise-free bag of the same drive, whose images are used instead of rendering
+  std::string bag;  ///< bag to write; rig_truth.yaml and the folder BAG_truth are written beside it
+  /// Noise-free bag of the same drive, whose images are used; those that faults change are rendered.
+  std::string images_from;
   bool truth_range = false;
   double height_cell_m = 0.1;
 };

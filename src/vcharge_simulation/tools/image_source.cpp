@@ -1,5 +1,6 @@
 #include "image_source.h"
 
+#include <utility>
 #include <vector>
 
 #include <nav_msgs/Odometry.h>
@@ -64,8 +65,13 @@ class RenderedImages : public ImageSource {
 
 class RecordedImages : public ImageSource {
  public:
-  RecordedImages(const std::string& path, const CameraRig& rig, const SimulatedDrive& drive)
-      : rig_(rig), drive_(drive), bag_(path), next_(rig.cameras.size(), 0) {
+  RecordedImages(const std::string& path, const CameraRig& rig, const SimulatedDrive& drive,
+                 IsChanged is_changed, std::unique_ptr<ImageSource> changed)
+      : rig_(rig),
+        drive_(drive),
+        is_changed_(std::move(is_changed)),
+        changed_(std::move(changed)),
+        bag_(path) {
     checkPoses(path);
     for (const RigCamera& camera : rig.cameras) {
       const std::string topic = DriveTopics().imageTopic(camera.name);
@@ -79,7 +85,10 @@ class RecordedImages : public ImageSource {
   }
 
   cv::Mat image(size_t camera, size_t frame) override {
-    const BagMessage recorded = bag_.read(entries_[camera].at(next_[camera]++));
+    if (is_changed_(camera, frame)) {
+      return changed_->image(camera, frame);
+    }
+    const BagMessage recorded = bag_.read(entries_[camera].at(frame));
     const auto message = recorded.instantiate<sensor_msgs::Image>();
     if (toTimestamp(message->header.stamp) != drive_.world_from_vehicle[frame].stamp) {
       throw InputError(recorded.source() + ": expected the images of the same drive, image " +
@@ -108,9 +117,10 @@ class RecordedImages : public ImageSource {
 
   const CameraRig& rig_;
   const SimulatedDrive& drive_;
+  const IsChanged is_changed_;
+  const std::unique_ptr<ImageSource> changed_;
   BagReader bag_;
   std::vector<std::vector<BagEntry>> entries_;  // per camera
-  std::vector<size_t> next_;                    // per camera
 };
 
 }  // namespace
@@ -123,8 +133,9 @@ std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const Record
 }
 
 std::unique_ptr<ImageSource> readImages(const std::string& bag, const CameraRig& rig,
-                                        const SimulatedDrive& drive) {
-  return std::make_unique<RecordedImages>(bag, rig, drive);
+                                        const SimulatedDrive& drive, IsChanged is_changed,
+                                        std::unique_ptr<ImageSource> changed) {
+  return std::make_unique<RecordedImages>(bag, rig, drive, std::move(is_changed), std::move(changed));
 }
 
 }  // namespace vcharge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,9 +28,14 @@ std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const Record
                                           const std::vector<double>& scene_times_s,
                                           const MotionBlurFault& blur, const LensGlare* glare);
 
-/// Reads the images of a bag; the arguments must outlive the source. Throws InputError, also while reading,
-/// if the bag cannot be read or is of another drive or of other cameras.
+/// Tells whether an image differs from that of the same drive without faults.
+using IsChanged = std::function<bool(size_t camera, size_t frame)>;
+
+/// Reads the images of a bag, but takes those that are changed from another source, which may be null if none
+/// is; the arguments must outlive the source. Throws InputError, also while reading, if the bag cannot be
+/// read or is of another drive or of other cameras.
 std::unique_ptr<ImageSource> readImages(const std::string& bag, const CameraRig& rig,
-                                        const SimulatedDrive& drive);
+                                        const SimulatedDrive& drive, IsChanged is_changed,
+                                        std::unique_ptr<ImageSource> changed);
 
 }  // namespace vcharge

@@ -26,8 +26,8 @@ int main(int argc, char** argv) {
       app.addOption("--output", &recording.bag, "bag to write").check(vcharge::requireOutput);
   app.addOption(
       "--images-from", &recording.images_from,
-      "bag of the same drive with the same --seed and --noise off, whose images are used instead of "
-      "rendering");
+      "bag of the same drive with the same --seed and --noise off, whose images are used; those that faults "
+      "change are rendered");
   app.addFlag("--truth-range", &recording.truth_range, "write the range of every pixel");
   app.addOption("--height-cell-m", &recording.height_cell_m, "cell size of the height map").showDefault();
   app.addOption("--threads", &threads, "number of threads; 0: one per core").notNegative().showDefault();
