@@ -57,6 +57,16 @@ TEST(BadInputTest, GoodImagesPassSoThatTheOthersFailForTheirReason) {
   for (Eigen::Index i = 0; i < error.size(); ++i) {
     EXPECT_LT(std::abs(error[i]), 4.0 * result.standard_deviations[i]) << i;
   }
+  const double shift_px = (result.model->principalPoint() - camera().principalPoint()).cwiseAbs().maxCoeff();
+  EXPECT_LT(shift_px, 4.0 * result.principal_point_sigma_px);
+  EXPECT_LT(result.principal_point_sigma_px, 1.0);
+  const auto radius_px = [](const CameraModel& model) {
+    Eigen::Vector2d side_px;
+    EXPECT_TRUE(model.project(Eigen::Vector3d(1.0, 0.0, 1.0), &side_px));
+    return side_px.x() - model.principalPoint().x();
+  };
+  EXPECT_LT(std::abs(radius_px(*result.model) / radius_px(camera()) - 1.0), 4.0 * result.focal_sigma);
+  EXPECT_LT(result.focal_sigma, 0.002);
   const std::string report = makeIntrinsicReport("title", board(), goodImages(), result);
   EXPECT_NE(report.find(toString(result.verdict)), std::string::npos);
   EXPECT_NE(report.find("image15"), std::string::npos);

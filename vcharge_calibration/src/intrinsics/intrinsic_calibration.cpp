@@ -271,7 +271,23 @@ class Calibration {
       ratio += (*fold - mean).cwiseQuotient(formal).squaredNorm() / static_cast<double>(size) *
                static_cast<double>(folds - 1) / static_cast<double>(folds);
     }
-    result_.standard_deviations = std::max(1.0, std::sqrt(ratio)) * formal;
+    const double inflation = std::max(1.0, std::sqrt(ratio));
+    result_.standard_deviations = inflation * formal;
+    findImageSigmas(fit.camera.model, inflation * inflation * *covariance);
+  }
+
+  void findImageSigmas(const CameraModel& camera, const Eigen::MatrixXd& covariance) {
+    camera.visit([&](const auto& model) {
+      Eigen::Vector2d centre_px, side_px;
+      Eigen::Matrix<double, 2, std::decay_t<decltype(model)>::kNumParameters> of_centre, of_side;
+      model.project(Eigen::Vector3d(0.0, 0.0, 1.0), &centre_px, nullptr, &of_centre);
+      model.project(Eigen::Vector3d(1.0, 0.0, 1.0), &side_px, nullptr, &of_side);
+      const auto of_size = (of_side - of_centre).row(0).eval();
+      result_.focal_sigma =
+          std::sqrt(of_size * covariance * of_size.transpose()) / std::abs(side_px.x() - centre_px.x());
+      result_.principal_point_sigma_px =
+          std::sqrt((of_centre * covariance * of_centre.transpose()).diagonal().maxCoeff());
+    });
   }
 
   const CalibrationBoard board_;

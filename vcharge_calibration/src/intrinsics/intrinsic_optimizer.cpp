@@ -94,54 +94,59 @@ class FlatnessCost : public ceres::SizedCostFunction<3, 3> {
 };
 
 /// Adjustment in the blocks of the bundle adjustment: the inverse poses of boards replace the vehicle's, with
-/// the camera at its origin.
+/// the camera at its origin. All blocks lie in one array: Ceres orders blocks by their addresses, and the
+/// last digits depend on that order.
 class Adjustment {
  public:
   Adjustment(const CalibrationBoard& board, const std::vector<BoardView>& views, const FittedCamera& start,
              const FitSettings& settings)
-      : manifold_(makePoseManifold()), problem_(ownership()), camera_(toPoseBlock(RigidTransform())) {
-    intrinsics_ = start.model.parameters();
-    for (int i = 0; i < board.numCorners(); ++i) {
-      corners_.push_back(board.corner(i));
+      : manifold_(makePoseManifold()),
+        problem_(ownership()),
+        num_intrinsics_(start.model.parameters().size()),
+        num_shapes_(settings.bending ? views.size() : static_cast<size_t>(board.numCorners())),
+        num_views_(views.size()),
+        bending_(settings.bending),
+        blocks_(kPoseSize + static_cast<size_t>(num_intrinsics_) + 3 * num_shapes_ + kPoseSize * num_views_) {
+    setPose(RigidTransform(), camera());
+    Eigen::Map<Eigen::VectorXd>(intrinsicsBlock(), num_intrinsics_) = start.model.parameters();
+    for (size_t s = 0; s < num_shapes_; ++s) {
+      Eigen::Map<Eigen::Vector3d>(shape(s), 3) =
+          bending_ ? start.boards[s].bending_m : board.corner(static_cast<int>(s));
     }
-    for (const PosedBoard& posed : start.boards) {
-      poses_.push_back(toPoseBlock(posed.camera_from_board.inverse()));
-      bendings_.push_back(posed.bending_m);
+    for (size_t v = 0; v < num_views_; ++v) {
+      setPose(start.boards[v].camera_from_board.inverse(), pose(v));
     }
-    problem_.AddParameterBlock(camera_.data(), 7);
-    problem_.SetParameterBlockConstant(camera_.data());
-    problem_.AddParameterBlock(intrinsics_.data(), static_cast<int>(intrinsics_.size()));
-    if (!settings.bending) {
-      for (Eigen::Vector3d& corner : corners_) {
-        problem_.AddParameterBlock(corner.data(), 3);
-        problem_.SetParameterBlockConstant(corner.data());
+    problem_.AddParameterBlock(camera(), kPoseSize);
+    problem_.SetParameterBlockConstant(camera());
+    problem_.AddParameterBlock(intrinsicsBlock(), static_cast<int>(num_intrinsics_));
+    for (size_t s = 0; s < num_shapes_; ++s) {
+      problem_.AddParameterBlock(shape(s), 3);
+      if (!bending_) {
+        problem_.SetParameterBlockConstant(shape(s));
       }
     }
-    const double usual_bending_m = kUsualBending * corners_.back().norm();
+    const double usual_bending_m = kUsualBending * board.corner(board.numCorners() - 1).norm();
     for (size_t v = 0; v < views.size(); ++v) {
       const double sigma_px = settings.sigmas_px.empty() ? settings.sigma_px : settings.sigmas_px[v];
       losses_.push_back(settings.loss == Loss::kRobust
                             ? std::make_unique<ceres::HuberLoss>(kRobust_px / sigma_px)
                             : nullptr);
-      problem_.AddParameterBlock(poses_[v].data(), 7, manifold_.get());
-      if (settings.bending) {
-        problem_.AddResidualBlock(new FlatnessCost(usual_bending_m), nullptr, bendings_[v].data());
+      problem_.AddParameterBlock(pose(v), kPoseSize, manifold_.get());
+      if (bending_) {
+        problem_.AddResidualBlock(new FlatnessCost(usual_bending_m), nullptr, shape(v));
       }
       for (const BoardCorner& corner : views[v].corners) {
         auto cost = makeReprojectionCost(start.model, corner.pixel, sigma_px);
-        double* shape = corners_[static_cast<size_t>(corner.index)].data();
-        if (settings.bending) {
+        if (bending_) {
           cost = std::make_unique<BentCornerCost>(std::move(cost), board, corner.index);
-          shape = bendings_[v].data();
         }
-        problem_.AddResidualBlock(cost.release(), losses_.back().get(), poses_[v].data(), camera_.data(),
-                                  intrinsics_.data(), shape);
+        problem_.AddResidualBlock(cost.release(), losses_.back().get(), pose(v), camera(), intrinsicsBlock(),
+                                  shape(bending_ ? v : static_cast<size_t>(corner.index)));
       }
     }
-    bending_ = settings.bending;
   }
 
-  void holdIntrinsics() { problem_.SetParameterBlockConstant(intrinsics_.data()); }
+  void holdIntrinsics() { problem_.SetParameterBlockConstant(intrinsicsBlock()); }
 
   bool solve() {
     ceres::Solver::Options options;
@@ -153,13 +158,13 @@ class Adjustment {
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
     auto* ordering = new ceres::ParameterBlockOrdering;  // NOLINT: Ceres takes ownership
-    for (PoseBlock& pose : poses_) {
-      ordering->AddElementToGroup(pose.data(), 0);
+    for (size_t v = 0; v < num_views_; ++v) {
+      ordering->AddElementToGroup(pose(v), 0);
     }
-    ordering->AddElementToGroup(intrinsics_.data(), 1);
-    ordering->AddElementToGroup(camera_.data(), 1);
-    for (Eigen::Vector3d& shape : bending_ ? bendings_ : corners_) {
-      ordering->AddElementToGroup(shape.data(), 1);
+    ordering->AddElementToGroup(intrinsicsBlock(), 1);
+    ordering->AddElementToGroup(camera(), 1);
+    for (size_t s = 0; s < num_shapes_; ++s) {
+      ordering->AddElementToGroup(shape(s), 1);
     }
     options.linear_solver_ordering.reset(ordering);
     ceres::Solver::Summary summary;
@@ -167,25 +172,30 @@ class Adjustment {
     return summary.IsSolutionUsable();
   }
 
-  std::vector<PosedBoard> boards() const {
+  std::vector<PosedBoard> boards() {
     std::vector<PosedBoard> boards;
-    for (size_t v = 0; v < poses_.size(); ++v) {
-      boards.push_back({fromPoseBlock(poses_[v]).inverse(), bendings_[v]});
+    for (size_t v = 0; v < num_views_; ++v) {
+      boards.push_back({fromPoseBlock(pose(v)).inverse(), Eigen::Vector3d::Zero()});
+      if (bending_) {
+        boards.back().bending_m = Eigen::Map<const Eigen::Vector3d>(shape(v));
+      }
     }
     return boards;
   }
-  const Eigen::VectorXd& intrinsics() const { return intrinsics_; }
+  Eigen::VectorXd intrinsics() {
+    return Eigen::Map<const Eigen::VectorXd>(intrinsicsBlock(), num_intrinsics_);
+  }
 
   std::optional<Eigen::MatrixXd> covariance() {
     ceres::Covariance::Options options;
     options.num_threads = 1;
     ceres::Covariance covariance(options);
-    const auto size = intrinsics_.size();
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> matrix(size, size);
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> matrix(num_intrinsics_,
+                                                                                  num_intrinsics_);
     const std::vector<std::pair<const double*, const double*>> blocks = {
-        {intrinsics_.data(), intrinsics_.data()}};
+        {intrinsicsBlock(), intrinsicsBlock()}};
     if (!covariance.Compute(blocks, &problem_) ||
-        !covariance.GetCovarianceBlock(intrinsics_.data(), intrinsics_.data(), matrix.data())) {
+        !covariance.GetCovarianceBlock(intrinsicsBlock(), intrinsicsBlock(), matrix.data())) {
       return std::nullopt;
     }
     return matrix;
@@ -199,15 +209,24 @@ class Adjustment {
     return options;
   }
 
+  static constexpr int kPoseSize = 7;
+  static void setPose(const RigidTransform& target_from_source, double* block) {
+    const PoseBlock pose = toPoseBlock(target_from_source);
+    std::copy(pose.begin(), pose.end(), block);
+  }
+  double* camera() { return blocks_.data(); }
+  double* intrinsicsBlock() { return camera() + kPoseSize; }
+  /// A view's bending where boards may be bent, otherwise a corner of the board.
+  double* shape(size_t s) { return intrinsicsBlock() + num_intrinsics_ + 3 * s; }
+  double* pose(size_t v) { return shape(num_shapes_) + kPoseSize * v; }
+
   std::unique_ptr<ceres::Manifold> manifold_;
   std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // one per view
   ceres::Problem problem_;
-  PoseBlock camera_;
-  Eigen::VectorXd intrinsics_;
-  std::vector<Eigen::Vector3d> corners_;
-  std::vector<PoseBlock> poses_;
-  std::vector<Eigen::Vector3d> bendings_;
-  bool bending_ = false;
+  const Eigen::Index num_intrinsics_;
+  const size_t num_shapes_, num_views_;
+  const bool bending_;
+  std::vector<double> blocks_;
 };
 
 }  // namespace

@@ -60,16 +60,17 @@ void writeCalibration(const CalibrationOutput& output, const CalibrationBoard& b
   if (output.keep_others && fs::exists(output.rig_file)) {
     rig = readCameraRig(output.rig_file);
   }
-  const RigCamera camera{
-      output.camera_name,
-      "camera_" + output.camera_name + "_optical",
-      result.image_size_px,
-      *result.model,
-      output.field_of_view_rad > 0.0 ? output.field_of_view_rad : 2.0 * result.max_angle_rad,
-      "",
-      {},
-      {},
-      {}};
+  RigCamera camera{output.camera_name,
+                   "camera_" + output.camera_name + "_optical",
+                   result.image_size_px,
+                   *result.model,
+                   output.field_of_view_rad > 0.0 ? output.field_of_view_rad : 2.0 * result.max_angle_rad,
+                   "",
+                   {},
+                   {},
+                   {}};
+  camera.focal_sigma = result.focal_sigma;
+  camera.principal_point_sigma_px = result.principal_point_sigma_px;
   const int index = rig.findCamera(output.camera_name);
   if (index < 0) {
     rig.cameras.push_back(camera);

@@ -56,6 +56,9 @@ struct IntrinsicCalibration {
   /// Standard deviations of the model's parameters, in their order, for errors that are correlated within a
   /// view (jackknife).
   Eigen::VectorXd standard_deviations;
+  /// The same of the image 45 degrees from the axis: of its size, relative, and of the principal point. The
+  /// parameters themselves are uncertain where one can make up for another.
+  double focal_sigma = 0.0, principal_point_sigma_px = 0.0;
   std::vector<CalibratedView> views;
   std::vector<RejectedImage> rejected;
   double rms_px = 0.0;              ///< RMS error per coordinate
