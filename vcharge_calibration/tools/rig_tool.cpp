@@ -29,7 +29,8 @@ void addRigToolArguments(CommandLine* app, RigToolArguments* arguments) {
       "time_offset_s, time_offset_sigma_s, cameras (name, num_observations, rms_px, standard_deviations of "
       "translation and rotation in the vehicle frame, travel_in_camera and up_in_camera as unit vectors "
       "where "
-      "known), stage_s (wall time), rig (the file that was written).");
+      "known, image_deviation: of the focal length's logarithm and the principal point, timing), stage_s "
+      "(wall time), rig (the file that was written).");
 }
 
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
@@ -55,6 +56,20 @@ nlohmann::json toJson(const RigCalibration& result, const std::map<std::string, 
         {"num_observations", camera.num_observations},
         {"rms_px", camera.rms_px},
         {"standard_deviations", toJson(camera.covariance.diagonal().cwiseMax(0.0).cwiseSqrt())}};
+    if (camera.intrinsics) {
+      entry["image_deviation"] = {{"values", toJson(camera.intrinsics->deviation)},
+                                  {"standard_deviations", toJson(camera.intrinsics->sigmas)},
+                                  {"is_corrected", camera.intrinsics->is_corrected}};
+    }
+    if (camera.timing) {
+      const ImageTiming found = camera.timing->found.normalized();
+      entry["timing"] = {
+          {"readout_s", found.readout_s},
+          {"readout_direction", enumNames<ReadoutDirection>()[static_cast<size_t>(found.readout_direction)]},
+          {"clock_offset_s", found.clock_offset_s},
+          {"standard_deviations", toJson(camera.timing->sigmas)},
+          {"is_corrected", camera.timing->is_corrected}};
+    }
     if (camera.initial.travel_in_camera.norm() > 0.0) {
       entry["travel_in_camera"] = toJson(camera.initial.travel_in_camera);
     }

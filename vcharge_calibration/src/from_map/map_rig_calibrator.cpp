@@ -90,7 +90,8 @@ void MapRigCalibrator::processFrame(const ImageFrame& frame) {
   const RigidTransform since = motionSinceKeyframe(odom_from_vehicle);
   if (keyframes_.isDue(since)) {
     images_.add(static_cast<int32_t>(views_.size()), frame.images);
-    addKeyframe(frame.stamp, localizer_->extract(frame.images), odom_from_vehicle);
+    addKeyframe(frame.stamp, localizer_->extract(frame.images, VehicleRates()), odom_from_vehicle,
+                frame.rates);
   } else {
     keyframes_.addFrame(frame.stamp, since, MotionHypothesis::kOdometry);
   }
@@ -102,7 +103,7 @@ RigidTransform MapRigCalibrator::motionSinceKeyframe(const RigidTransform& odom_
 }
 
 void MapRigCalibrator::addKeyframe(Timestamp stamp, RigFeatures features,
-                                   const RigidTransform& odom_from_vehicle) {
+                                   const RigidTransform& odom_from_vehicle, const VehicleRates& rates) {
   MapKeyframeView view;
   view.features = std::move(features);
   view.camera_fixes.resize(rig_->cameras.size());
@@ -113,6 +114,7 @@ void MapRigCalibrator::addKeyframe(Timestamp stamp, RigFeatures features,
   Keyframe keyframe;
   keyframe.stamp = stamp;
   keyframe.odom_from_vehicle = odom_from_vehicle;
+  keyframe.rates = rates;
   keyframe.travelled_m = travelled_m_;
   keyframes_.addKeyframe(std::move(keyframe), since, MotionHypothesis::kOdometry);
   views_.push_back(std::move(view));

@@ -104,7 +104,7 @@ TEST_F(MapRigCalibratorTest, GivesTheSameBitsOnOneThread) {
   const RigCalibration parallel = drive(brief)->finish(nullptr);
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   const RigCalibration serial = drive(brief)->finish(nullptr);
-  ASSERT_NE(parallel.rig, nullptr);
+  ASSERT_NE(parallel.rig, nullptr) << parallel.remarks.front();
   for (size_t i = 0; i < parallel.rig->cameras.size(); ++i) {
     EXPECT_EQ(parallel.rig->cameras[i].vehicle_from_camera->translation(),
               serial.rig->cameras[i].vehicle_from_camera->translation());

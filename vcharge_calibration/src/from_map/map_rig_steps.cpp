@@ -44,6 +44,7 @@ class MapRigSteps {
   RigCalibration run() {
     result_.is_from_map = true;
     priors_.height_sigma_m = options_.height_sigma_m;
+    addKnownCameras(*data_->rig, &priors_);
     try {
       describeDrive(*state_, &result_);
       stages_.run("initial estimate", [&] {

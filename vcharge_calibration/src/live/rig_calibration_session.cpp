@@ -1,5 +1,6 @@
 #include "vcharge_calibration/live/rig_calibration_session.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -12,8 +13,8 @@ namespace {
 
 /// Turn after which the coach updates its outlook.
 constexpr double kOutlookTurn_rad = 0.3;
-/// Progress of a drive from which a session that calibrates itself tries to.
-constexpr double kFirstProgress = 0.5;
+/// Part of the coach's distance after which a session that calibrates itself begins.
+constexpr double kFirstDistance = 0.5;
 /// A vehicle without a keyframe for so long stands.
 constexpr double kStanding_s = 1.0;
 
@@ -91,6 +92,15 @@ struct RigCalibrationSession::Follower {
            turn_rad >= kOutlookTurn_rad;
   }
 
+  /// Whether a calibration can begin from the drive so far. Others go on from it.
+  bool canCalibrate(const CalibrationCoachOptions& options) const {
+    const auto isKnown = [](const CameraOutlook& camera) {
+      return camera.hand_eye.status == HandEyeStatus::kOk;
+    };
+    return outlook.distance_m >= kFirstDistance * options.enough_distance_m &&
+           std::all_of(outlook.cameras.begin(), outlook.cameras.end(), isKnown);
+  }
+
   void updateOutlook() {
     const ReconstructionState& state = calibrator.state();
     updateCoach(state, &coach);
@@ -105,7 +115,8 @@ struct RigCalibrationSession::Follower {
 struct RigCalibrationSession::Job {
   FinishedCalibration work;
   KeyframeImages all_images;
-  bool is_early = false;  // its failure is no news
+  std::optional<RigCalibrationState> earlier;  // of the same drive, from which it goes on
+  bool is_early = false;                       // its failure is no news
   std::atomic<bool> is_abandoned{false}, is_done{false};
 };
 
@@ -172,7 +183,7 @@ void RigCalibrationSession::follow(Timestamp now, const Feed& feed) {
 bool RigCalibrationSession::isCalibrationDue() const {
   const std::vector<Keyframe>& keyframes = follower_->calibrator.state().data.keyframes;
   const bool is_free = !job_ || job_->is_done;
-  if (!options_.calibrates_itself || !is_free || follower_->outlook.progress < kFirstProgress ||
+  if (!options_.calibrates_itself || !is_free || !follower_->canCalibrate(options_.coach) ||
       keyframes.size() == follower_->calibrated_keyframes) {
     return false;
   }
@@ -233,7 +244,12 @@ bool RigCalibrationSession::begin(bool is_asked_for, std::string* message) {
 
 /// Makes a job of the drive so far, and returns what it begins with in a line.
 std::string RigCalibrationSession::makeJob(bool is_asked_for) {
+  const std::shared_ptr<Job> previous = std::move(job_);
   job_ = std::make_shared<Job>();
+  const bool is_adjusted = previous && previous->work.result.num_landmarks > 0;
+  if (is_adjusted && !previous->is_abandoned) {
+    job_->earlier = RigCalibrationState{previous->work.result, std::move(previous->work.state)};
+  }
   if (is_asked_for) {
     follower_->calibrator.flush();
   }
@@ -268,6 +284,22 @@ std::shared_ptr<RigCalibrationSession::Job> RigCalibrationSession::nextJob() {
   return job_;
 }
 
+/// Calibrates; what goes on from an earlier calibration and fails is made again from the whole drive, unless
+/// it is early.
+void RigCalibrationSession::calibrate(Job* job, const StageCallback& progress) const {
+  std::optional<ReconstructionState> whole_drive;
+  if (job->earlier && !job->is_early) {
+    whole_drive = job->work.state;
+  }
+  FinishedCalibration& work = job->work;
+  work.result = calibrateFollowedDrive(calibrator_options_, job->all_images, progress, &work.state,
+                                       std::move(job->earlier));
+  if (whole_drive && work.result.verdict == Verdict::kFail) {
+    work.state = std::move(*whole_drive);
+    work.result = calibrateFollowedDrive(calibrator_options_, job->all_images, progress, &work.state);
+  }
+}
+
 void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
   const auto tellOfJob = [&](const std::function<void(Status*)>& change) {
     tell([&](Status* status) {
@@ -279,28 +311,26 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
   Phase phase = Phase::kFailed;
   std::string message;
   try {
-    job->work.result = calibrateFollowedDrive(
-        calibrator_options_, job->all_images,
-        [&](const StageProgress& progress) {
-          if (job->is_abandoned) {
-            throw Abandoned();
-          }
-          if (job->is_early) {
-            return;
-          }
-          tellOfJob([&](Status* status) {
-            status->message = "stage " + std::to_string(progress.number) + " of " +
-                              std::to_string(progress.num_stages) + ", " + progress.stage;
-            status->progress = (progress.number - 1 + progress.fraction) / progress.num_stages;
-          });
-        },
-        &job->work.state);
+    calibrate(job.get(), [&](const StageProgress& progress) {
+      if (job->is_abandoned) {
+        throw Abandoned();
+      }
+      if (job->is_early) {
+        return;
+      }
+      tellOfJob([&](Status* status) {
+        status->message = "stage " + std::to_string(progress.number) + " of " +
+                          std::to_string(progress.num_stages) + ", " + progress.stage;
+        status->progress = (progress.number - 1 + progress.fraction) / progress.num_stages;
+      });
+    });
     if (job->is_abandoned) {
       throw Abandoned();
     }
     const bool has_failed = job->work.result.verdict == Verdict::kFail;
     if (job->is_early && has_failed) {
-      throw Abandoned();
+      job->is_done = true;  // no news
+      return;
     }
     const std::string more = on_result_(job->work);
     message = describe(job->work.result) + (more.empty() ? "" : "; " + more);
@@ -318,7 +348,6 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
     status->message = (job->is_early ? "so far " : "") + message;
     status->result = std::make_shared<const RigCalibration>(job->work.result);
   });
-  job->work.state = ReconstructionState();
   job->is_done = true;
 }
 

@@ -64,8 +64,9 @@ class NeighbourSearch {
         cache_(data.rig, smallViews()),
         tracker_(patchOptions()) {}
 
-  std::vector<Found> run() {
-    for (size_t k = 0; k < data_.keyframes.size(); k += static_cast<size_t>(options_.keyframe_step)) {
+  std::vector<Found> run(size_t first_of_new) {
+    const auto step = static_cast<size_t>(options_.keyframe_step);
+    for (size_t k = (first_of_new + step - 1) / step * step; k < data_.keyframes.size(); k += step) {
       for (const HistoryView& earlier : chooseHistory(k)) {
         matchViews(earlier, k);
       }
@@ -164,7 +165,7 @@ class NeighbourSearch {
     }
     std::vector<int32_t> tracks;
     std::vector<cv::Point2f> seen_px, expected_px;
-    const RigidTransform second_from_map = cameraFromMap(k, second_);
+    const MovingCamera second = cameraAt(data_.keyframes[k], data_.rig->cameras[second_]);
     for (const LandmarkPixel& observation : earlier.common) {
       Eigen::Vector3d ray;
       if (!data_.rig->cameras[first_].model.unproject(observation.position_px, &ray)) {
@@ -172,7 +173,7 @@ class NeighbourSearch {
       }
       const auto seen = toView(*pair->first, ray);
       const auto expected =
-          toView(*pair->second, second_from_map * *data_.tracks[observation.track].position_m);
+          toView(*pair->second, second.pointInCamera(*data_.tracks[observation.track].position_m));
       if (seen && expected) {
         tracks.push_back(observation.track);
         seen_px.push_back(*seen);
@@ -239,7 +240,7 @@ bool isSeenAt(const Track& track, int32_t keyframe, int32_t camera) {
 }  // namespace
 
 int64_t matchBetweenCameras(const InterCameraOptions& options, const KeyframeImages& images,
-                            ReconstructionData* data) {
+                            ReconstructionData* data, size_t first_of_new) {
   std::vector<std::vector<LandmarkPixel>> observations(data->keyframes.size() * data->rig->cameras.size());
   for (size_t t = 0; t < data->tracks.size(); ++t) {
     if (!data->tracks[t].position_m) {
@@ -254,7 +255,8 @@ int64_t matchBetweenCameras(const InterCameraOptions& options, const KeyframeIma
   const std::vector<std::pair<size_t, size_t>> pairs = neighboursOf(*data->rig);
   std::vector<std::vector<Found>> found(pairs.size());
   tbb::parallel_for(size_t{0}, pairs.size(), [&](size_t i) {
-    found[i] = NeighbourSearch(options, images, *data, observations, pairs[i].first, pairs[i].second).run();
+    found[i] = NeighbourSearch(options, images, *data, observations, pairs[i].first, pairs[i].second)
+                   .run(first_of_new);
   });
   int64_t num_added = 0;
   for (const std::vector<Found>& of_pair : found) {

@@ -11,8 +11,9 @@ namespace vcharge {
 /// Searches for each camera's landmarks in the images that its neighbours take within the next metres (paper,
 /// section Inter-Camera Feature Matching): both images are rectified to the mean rotation of the two cameras,
 /// where patches look alike, and the patch is aligned from its predicted position. Adds the observations to
-/// the tracks and returns their number. Data parallel, deterministic.
+/// the tracks and returns their number. Searches in keyframes from `first_of_new` on. Data parallel,
+/// deterministic.
 int64_t matchBetweenCameras(const InterCameraOptions& options, const KeyframeImages& images,
-                            ReconstructionData* data);
+                            ReconstructionData* data, size_t first_of_new = 0);
 
 }  // namespace vcharge

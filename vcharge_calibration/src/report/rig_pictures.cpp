@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "vcharge_core/files/svg_plot.h"
+#include "vcharge_reconstruction/bundle_adjustment.h"
 
 namespace vcharge {
 namespace {
@@ -104,22 +105,14 @@ std::string drawCameras(const CameraRig& rig) {
 
 std::vector<std::vector<CornerError>> errorsByCamera(const ReconstructionData& data) {
   std::vector<std::vector<CornerError>> errors(data.rig->cameras.size());
-  std::vector<RigidTransform> camera_from_vehicle;
-  for (const RigCamera& camera : data.rig->cameras) {
-    camera_from_vehicle.push_back(camera.vehicle_from_camera->inverse());
-  }
   for (const Track& track : data.tracks) {
     if (!track.position_m) {
       continue;
     }
     for (const TrackObservation& observation : track.observations) {
-      const auto camera = static_cast<size_t>(observation.camera);
-      const Keyframe& keyframe = data.keyframes[static_cast<size_t>(observation.keyframe)];
-      Eigen::Vector2d pixel;
-      if (data.rig->cameras[camera].model.project(
-              camera_from_vehicle[camera] * (keyframe.map_from_vehicle.inverse() * *track.position_m),
-              &pixel)) {
-        errors[camera].push_back({observation.position_px, pixel - observation.position_px});
+      Eigen::Vector2d error_px;
+      if (reprojectionError(data, track, observation, &error_px)) {
+        errors[static_cast<size_t>(observation.camera)].push_back({observation.position_px, error_px});
       }
     }
   }

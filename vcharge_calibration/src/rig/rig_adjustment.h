@@ -22,6 +22,9 @@ struct OdometryNoise {
 /// Estimates an upper bound from keyframes adjusted with loose odometry: it contains their own errors.
 OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data);
 
+/// Length of parts of a drive whose errors are independent.
+constexpr double kIndependent_m = 10.0;
+
 /// Prior knowledge in addition to the images.
 struct RigPriors {
   OdometryNoise odometry;
@@ -35,16 +38,27 @@ struct RigPriors {
   std::vector<RigidTransform> vehicle_from_camera;
   Eigen::MatrixXd extrinsics_information;
 
+  /// Models known before, with the deviations of the cameras' images that their calibration states (0: none),
+  /// and those that heat or a lens focused again may add. Empty: the rig's models are certain.
+  std::vector<CameraModel> models;
+  std::vector<ImageDeviation> stated_image_sigmas, possible_image_sigmas;
+  std::vector<ImageTiming> timings;  ///< known before
+
   /// All ground counts, and not only where its height is precise: the cameras seem tilted by some hundredths
   /// of a degree, but a short part of a drive shows at all how the body stands.
   bool uses_all_ground = false;
 
   bool hasMap() const { return !landmark_information.empty(); }
 };
+/// Takes the models and the timing of a rig's cameras as known.
+void addKnownCameras(const CameraRig& rig, RigPriors* priors);
+/// How the images of a camera deviate from those of a model of the same kind.
+ImageDeviation imageDeviation(const CameraModel& camera, const CameraModel& known);
 
-/// Adjusts extrinsics, keyframes, landmarks and the odometer's factors together (paper, equation joint_opt),
-/// and removes outliers; landmarks of a finished map keep their positions. Landmarks on the ground fix
-/// heights and tilt, which planar motion hardly determines.
+/// Adjusts extrinsics, intrinsics and timing where the options and the priors say so, keyframes, landmarks
+/// and the odometer's factors together (paper, equation joint_opt), and removes outliers; landmarks of a
+/// finished map keep their positions. Landmarks on the ground fix heights and tilt, which planar motion
+/// hardly determines.
 BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,
                                   ReconstructionData* data);
 
@@ -54,8 +68,22 @@ struct RigUncertainty {
   Eigen::MatrixXd covariance;     ///< marginal, for independent errors
   Eigen::MatrixXd jackknife;      ///< estimated by leaving out parts of the drive
   Eigen::MatrixXd with_odometer;  ///< covariance that begins with the odometer's factors, distance and turn
+  Eigen::MatrixXd by_intrinsics;  ///< by the stated deviations of intrinsics that were not adjusted
+  // How the images deviate from the rig's models, three rows of each camera, if an adjustment of the
+  // intrinsics went one step, with the covariances. Empty if intrinsics are certain.
+  Eigen::VectorXd image_deviations;
+  Eigen::MatrixXd image_covariance, image_jackknife;
 };
 RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
                               const ReconstructionData& data);
+
+/// How the cameras' timing deviates from the rig's after one step of an adjustment of it, two rows of each
+/// camera, with covariances as in RigUncertainty. Empty if the timing is not observable.
+struct TimingUncertainty {
+  Eigen::VectorXd deviations;
+  Eigen::MatrixXd covariance, jackknife;
+};
+TimingUncertainty timingUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
+                                    const ReconstructionData& data);
 
 }  // namespace vcharge

@@ -101,6 +101,145 @@ TEST(RigAdjustmentTest, CovarianceMatchesTheErrors) {
   }
 }
 
+/// Replaces the cameras' models by ones whose images deviate by the given amount.
+void disturbIntrinsics(const ImageDeviation& deviation, ReconstructionData* data) {
+  auto rig = std::make_shared<CameraRig>(*data->rig);
+  for (RigCamera& camera : rig->cameras) {
+    camera.model = camera.model.withImage(std::exp(-deviation[0]), -deviation.tail<2>());
+  }
+  data->rig = rig;
+}
+
+TEST(RigAdjustmentTest, CorrectsIntrinsicsThatHeatHasChanged) {
+  const ImageDeviation truth(0.002, 1.0, -0.7);
+  ReconstructionData data = testing::makeAnalyticDrive(1, kNoise_px);
+  const std::shared_ptr<const CameraRig> true_rig = data.rig;
+  disturbIntrinsics(truth, &data);
+  ReconstructionData kept = data;
+  RigPriors priors;
+  addKnownCameras(*data.rig, &priors);
+  RigAdjustmentOptions options = makeOptions();
+  options.bundle.outlier_sigmas = INFINITY;
+  adjustRig(options, priors, &kept);
+  options.refine_intrinsics = true;
+  adjustRig(options, priors, &data);
+  const RigUncertainty uncertainty = rigUncertainty(options, priors, data);
+  ASSERT_TRUE(uncertainty.is_valid);
+  EXPECT_EQ(uncertainty.covariance.rows(), 12);
+  for (size_t i = 0; i < 2; ++i) {
+    const ImageDeviation found = imageDeviation(data.rig->cameras[i].model, priors.models[i]);
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    const Eigen::Vector3d sigmas = uncertainty.image_covariance.diagonal().segment<3>(at).cwiseSqrt();
+    EXPECT_LT((found - truth).cwiseQuotient(sigmas).cwiseAbs().maxCoeff(), 4.0) << found.transpose();
+    EXPECT_LT(sigmas[0], 0.0005);
+    EXPECT_LT(errorOf(*data.rig, *true_rig, i).tail<3>().norm(),
+              0.5 * errorOf(*kept.rig, *true_rig, i).tail<3>().norm())
+        << "extrinsics make up for wrong intrinsics";
+  }
+}
+
+TEST(RigAdjustmentTest, TellsHowImagesDeviateWithoutCorrectingThem) {
+  for (const double sign : {0.0, 1.0, -1.0}) {
+    const ImageDeviation truth = sign * ImageDeviation(0.002, 1.0, -0.7);
+    ReconstructionData data = testing::makeAnalyticDrive(1, kNoise_px);
+    disturbIntrinsics(truth, &data);
+    const std::shared_ptr<const CameraRig> given = data.rig;
+    RigPriors priors;
+    addKnownCameras(*data.rig, &priors);
+    RigAdjustmentOptions options = makeOptions();
+    options.bundle.outlier_sigmas = INFINITY;
+    adjustRig(options, priors, &data);
+    EXPECT_EQ(data.rig->cameras[0].model.parameters(), given->cameras[0].model.parameters());
+    const RigUncertainty uncertainty = rigUncertainty(options, priors, data);
+    ASSERT_TRUE(uncertainty.is_valid);
+    for (Eigen::Index i = 0; i < 2; ++i) {
+      EXPECT_NEAR(uncertainty.image_deviations[3 * i], truth[0], 0.0006) << sign;
+    }
+  }
+}
+
+/// A drive with rolling shutters, of which its rig says nothing.
+ReconstructionData makeDriveOfUnknownTiming(const ImageTiming& truth) {
+  ReconstructionData data = testing::makeAnalyticDrive(1, kNoise_px, 0.0, truth);
+  auto rig = std::make_shared<CameraRig>(*data.rig);
+  for (RigCamera& camera : rig->cameras) {
+    camera.timing = ImageTiming();
+  }
+  data.rig = rig;
+  return data;
+}
+
+TEST(RigAdjustmentTest, FindsReadoutTimesAndClockOffsets) {
+  const ImageTiming truth{0.02, ReadoutDirection::kDown, 0.0};
+  ReconstructionData data = makeDriveOfUnknownTiming(truth);
+  const std::shared_ptr<const CameraRig> true_rig = data.rig;
+  RigPriors priors;
+  addKnownCameras(*data.rig, &priors);
+  RigAdjustmentOptions options = makeOptions();
+  options.bundle.outlier_sigmas = INFINITY;
+  options.refine_timing = true;
+  options.bundle.cost_tolerance = 1e-6;  // it begins far away
+  adjustRig(options, priors, &data);
+  const TimingUncertainty uncertainty = timingUncertainty(options, priors, data);
+  ASSERT_EQ(uncertainty.deviations.size(), 4);
+  for (size_t i = 0; i < 2; ++i) {
+    const ImageTiming& found = data.rig->cameras[i].timing;
+    const auto at = static_cast<Eigen::Index>(2 * i);
+    const Eigen::Vector2d sigmas_s = uncertainty.covariance.diagonal().segment<2>(at).cwiseSqrt();
+    EXPECT_LT(std::abs(found.readout_s - truth.readout_s), 4.0 * sigmas_s[0]) << found.readout_s;
+    EXPECT_LT(std::abs(found.clock_offset_s - truth.clock_offset_s), 4.0 * sigmas_s[1])
+        << found.clock_offset_s;
+    EXPECT_LT(sigmas_s.maxCoeff(), 0.001);
+    const Vector6d error = errorOf(*data.rig, *true_rig, i);
+    EXPECT_LT(error.head<3>().cwiseAbs().maxCoeff(), 0.01) << error.transpose();
+    EXPECT_LT(std::abs(error[5]) / kDegree, 0.05) << error.transpose();
+    EXPECT_LT(error.tail<3>().norm() / kDegree, 0.1) << "the ground is rough: " << error.transpose();
+  }
+}
+
+TEST(RigAdjustmentTest, TellsTheTimingWithoutCorrectingIt) {
+  const ImageTiming truth{0.01, ReadoutDirection::kDown, 0.0};
+  ReconstructionData data = makeDriveOfUnknownTiming(truth);
+  RigPriors priors;
+  addKnownCameras(*data.rig, &priors);
+  RigAdjustmentOptions options = makeOptions();
+  options.bundle.outlier_sigmas = INFINITY;
+  adjustRig(options, priors, &data);
+  EXPECT_TRUE(data.rig->cameras[0].timing.isInstant());
+  const TimingUncertainty uncertainty = timingUncertainty(options, priors, data);
+  ASSERT_EQ(uncertainty.deviations.size(), 4);
+  EXPECT_NEAR(uncertainty.deviations[0], truth.readout_s, 0.003);
+  EXPECT_NEAR(uncertainty.deviations[2], truth.readout_s, 0.003);
+}
+
+TEST(RigAdjustmentTest, StatedDeviationsOfIntrinsicsMakeExtrinsicsUncertain) {
+  ReconstructionData data = testing::makeAnalyticDrive(1, kNoise_px);
+  const RigAdjustmentOptions options = makeOptions();
+  adjustRig(options, RigPriors(), &data);
+  const Eigen::MatrixXd certain = rigUncertainty(options, RigPriors(), data).covariance;
+  RigPriors priors;
+  addKnownCameras(*data.rig, &priors);
+  const RigUncertainty not_stated = rigUncertainty(options, priors, data);
+  EXPECT_LT((not_stated.covariance - certain).norm(), 1e-3 * certain.norm());
+  EXPECT_EQ(not_stated.by_intrinsics.norm(), 0.0);
+  for (ImageDeviation& sigmas : priors.stated_image_sigmas) {
+    sigmas = ImageDeviation(0.001, 0.5, 0.5);
+  }
+  const Eigen::MatrixXd stated = rigUncertainty(options, priors, data).by_intrinsics;
+  EXPECT_GT(stated(5, 5), certain(5, 5)) << "a shift of the image is nearly a yaw";
+}
+
+TEST(RigAdjustmentTest, JackknifeLeavesOutABodyThatLeansToBothSides) {
+  const auto rollVariance = [](double lean_rad) {
+    ReconstructionData data = testing::makeAnalyticDrive(1, kNoise_px, lean_rad);
+    adjustRig(makeOptions(), RigPriors(), &data);
+    const RigUncertainty uncertainty = rigUncertainty(makeOptions(), RigPriors(), data);
+    EXPECT_TRUE(uncertainty.is_valid);
+    return uncertainty.jackknife(3, 3);
+  };
+  EXPECT_LT(rollVariance(0.1 * kDegree), 2.0 * rollVariance(0.0));
+}
+
 TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
   ReconstructionData parallel = testing::makeAnalyticDrive(2, kNoise_px);
   disturbRig(&parallel);
@@ -226,7 +365,8 @@ TEST(GroundTest, BiasFollowsTheDeviationOfHeights) {
       track.covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
     }
     bias[i] = findGroundBias(data, findPreciseGround(data, 0.15));
-    EXPECT_NEAR(bias[i].height_m, 0.25 * sigma_m, 1e-9);
+    EXPECT_LT(bias[i].height_m, 0.5 * sigma_m) << "many landmarks are more precise than one";
+    EXPECT_GT(bias[i].height_m, 0.1 * sigma_m) << "neighbours err alike";
     // Ground is seen within five metres.
     EXPECT_GT(bias[i].pitch_rad, bias[i].height_m / 5.0);
     EXPECT_GT(bias[i].roll_rad, bias[i].height_m / 5.0);

@@ -69,6 +69,37 @@ Eigen::Matrix<double, 6, 1> positionAndAngleSigmas(const Eigen::Matrix<double, 6
   return result;
 }
 
+std::string describeIntrinsics(const IntrinsicsDeviation& found) {
+  constexpr double kShownRatio = 0.5;
+  const auto value = [&](const char* name, int axis, double unit, const char* unit_name, int digits) {
+    const double sigma = found.sigmas[axis], prior_sigma = found.prior_sigmas[axis];
+    return name + toText(unit * found.deviation[axis], digits) + " +- " + toText(unit * sigma, digits) +
+           unit_name + (sigma < kShownRatio * prior_sigma ? "" : " (hardly seen in this drive)");
+  };
+  return value("focal length ", 0, 100.0, " %", 3) + value(", principal point ", 1, 1.0, " px", 2) +
+         value(", ", 2, 1.0, " px", 2);
+}
+
+std::string describeTiming(const TimingEstimate& timing) {
+  constexpr double kShown_s = 0.00005;
+  const auto readout = [](const ImageTiming& each) {
+    const char* const names[] = {"top to bottom", "bottom to top", "left to right", "right to left"};
+    const ImageTiming normalized = each.normalized();
+    return "lines from " + std::string(names[static_cast<size_t>(normalized.readout_direction)]) +
+           " within " + toText(1000.0 * normalized.readout_s, 1) + " ms";
+  };
+  const auto offset = [](const ImageTiming& each) {
+    return "clock offset " + toText(1000.0 * each.clock_offset_s, 1) + " ms";
+  };
+  const bool knows_readout = timing.known.readout_s > kShown_s;
+  const bool knows_offset = std::abs(timing.known.clock_offset_s) > kShown_s;
+  std::string known = knows_readout ? readout(timing.known) : "";
+  known += knows_offset ? (knows_readout ? ", " : "") + offset(timing.known) : "";
+  return readout(timing.found) + " +- " + toText(1000.0 * timing.sigmas[0], 2) + " ms, " +
+         offset(timing.found) + " +- " + toText(1000.0 * timing.sigmas[1], 2) + " ms; the rig said " +
+         (known.empty() ? "all at the stamp" : known);
+}
+
 std::string describeCalibration(const RigCalibration& result) {
   std::string text = toText(result.distance_m, 0) + " m, " + toText(kDegrees * result.left_turn_rad, 0) +
                      " degrees of turn to the left, " + toText(kDegrees * result.right_turn_rad, 0) +
@@ -90,6 +121,14 @@ std::string describeCalibration(const RigCalibration& result) {
   text += heading;
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     text += describeCamera(result.cameras[i], *result.rig->cameras[i].vehicle_from_camera);
+  }
+  for (const CameraCalibration& camera : result.cameras) {
+    if (camera.intrinsics && camera.intrinsics->is_corrected) {
+      text += "camera '" + camera.name + "': corrected by " + describeIntrinsics(*camera.intrinsics) + "\n";
+    }
+    if (camera.timing && camera.timing->is_corrected) {
+      text += "camera '" + camera.name + "': " + describeTiming(*camera.timing) + "\n";
+    }
   }
   return text + "height: " + result.height_source + "\nscale, common to all positions: +- " +
          toText(100.0 * result.rig->scale_sigma, 2) + " %\n";

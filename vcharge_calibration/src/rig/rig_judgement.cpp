@@ -25,6 +25,8 @@ constexpr int kHalfIterations = 10;
 constexpr double kJackknifeFactor = 2.0;
 /// Least variance over that for independent errors, whose steps of a wheel counter cancel one another.
 constexpr double kLeastRatio = 0.25;
+/// The same for angles, which depend on the ground, and that is often smoother than assumed.
+constexpr double kLeastAngleRatio = 0.05;
 // Usual range of landmarks.
 constexpr double kRange_m = 2.5;
 // How a body stands on its wheels while it drives, beside how it stands at rest.
@@ -78,10 +80,8 @@ class ErrorStatistics {
 
 void countObservations(const ReconstructionData& data, RigCalibration* result) {
   std::vector<ErrorStatistics> statistics;
-  std::vector<RigidTransform> camera_from_vehicle;
   for (const RigCamera& camera : data.rig->cameras) {
     statistics.emplace_back(camera.image_size_px);
-    camera_from_vehicle.push_back(camera.vehicle_from_camera->inverse());
   }
   for (const Track& track : data.tracks) {
     if (!track.position_m) {
@@ -90,12 +90,9 @@ void countObservations(const ReconstructionData& data, RigCalibration* result) {
     ++result->num_landmarks;
     std::set<int32_t> cameras;
     for (const TrackObservation& observation : track.observations) {
-      Eigen::Vector2d pixel;
-      const Eigen::Vector3d in_camera =
-          camera_from_vehicle[observation.camera] *
-          (data.keyframes[observation.keyframe].map_from_vehicle.inverse() * *track.position_m);
-      if (data.rig->cameras[observation.camera].model.project(in_camera, &pixel)) {
-        statistics[observation.camera].add(observation.position_px, pixel - observation.position_px);
+      Eigen::Vector2d error_px;
+      if (reprojectionError(data, track, observation, &error_px)) {
+        statistics[observation.camera].add(observation.position_px, error_px);
         cameras.insert(observation.camera);
       }
     }
@@ -121,6 +118,7 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& optio
     half.keyframes.emplace_back();
     half.keyframes.back().odom_from_vehicle = keyframe.odom_from_vehicle;
     half.keyframes.back().map_from_vehicle = keyframe.map_from_vehicle;
+    half.keyframes.back().rates = keyframe.rates;
     half.keyframes.back().travelled_m = keyframe.travelled_m;
   }
   RigPriors half_priors;
@@ -130,7 +128,7 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& optio
     const Track& track = data.tracks[t];
     if (track.position_m) {
       const double travelled_m = data.keyframes[track.observations.front().keyframe].travelled_m;
-      if ((static_cast<int64_t>(travelled_m / options.segment_m) % 2 == 1) == odd) {
+      if ((static_cast<int64_t>(travelled_m / kIndependent_m) % 2 == 1) == odd) {
         half.tracks.push_back(track);
         if (!priors.landmark_information.empty()) {
           half_priors.landmark_information.push_back(priors.landmark_information[t]);
@@ -147,9 +145,55 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& optio
 /// Ratio of a camera's standard deviations to those for independent errors. The jackknife knows which errors
 /// have a cause in common, but its residuals are smaller than the errors, because the adjustment has followed
 /// half of these. It is noisy where few parts of the drive tell of a direction.
-Vector6d inflationOf(const Matrix6d& independent, const Matrix6d& jackknife) {
-  const Vector6d ratio = kJackknifeFactor * jackknife.diagonal().cwiseQuotient(independent.diagonal());
-  return ratio.cwiseMax(kLeastRatio).cwiseSqrt();
+template <int kSize>
+Eigen::Matrix<double, kSize, 1> inflationOf(const Eigen::Matrix<double, kSize, kSize>& independent,
+                                            const Eigen::Matrix<double, kSize, kSize>& jackknife,
+                                            const Eigen::Matrix<double, kSize, 1>& least_ratio) {
+  const Eigen::Matrix<double, kSize, 1> ratio =
+      kJackknifeFactor * jackknife.diagonal().cwiseQuotient(independent.diagonal());
+  return ratio.cwiseMax(least_ratio).cwiseSqrt();
+}
+
+/// How a camera's image deviates. Errors that are common to the drive add to those by the jackknife: a shift
+/// of an image differs from a turn of its camera at the rim only, where the difference is small.
+IntrinsicsDeviation intrinsicsOf(const RigAdjustmentOptions& options, const RigPriors& priors,
+                                 const RigCamera& adjusted, size_t camera,
+                                 const RigUncertainty& uncertainty) {
+  constexpr double kShiftOverDirection = 6.0, kRadius = 0.25;  // of the image's width
+  const double shift_px = kShiftOverDirection * options.common_error_px;
+  const ImageDeviation common(options.common_error_px / (kRadius * adjusted.image_size_px.width), shift_px,
+                              shift_px);
+  const auto at = static_cast<Eigen::Index>(3 * camera);
+  const Eigen::Matrix3d independent = uncertainty.image_covariance.block<3, 3>(at, at);
+  const Eigen::Vector3d inflation = inflationOf<3>(
+      independent, uncertainty.image_jackknife.block<3, 3>(at, at), Eigen::Vector3d::Constant(kLeastRatio));
+  const ImageDeviation variances =
+      inflation.cwiseAbs2().cwiseProduct(independent.diagonal()) + common.cwiseAbs2();
+  const ImageDeviation deviation = options.refine_intrinsics
+                                       ? imageDeviation(adjusted.model, priors.models[camera])
+                                       : uncertainty.image_deviations.segment<3>(at).eval();
+  return {deviation, variances.cwiseSqrt(), priors.possible_image_sigmas[camera], options.refine_intrinsics};
+}
+
+/// When a camera exposes its images; the offset of all clocks is that of the odometry.
+TimingEstimate timingOf(const RigAdjustmentOptions& options, const RigPriors& priors,
+                        const RigCalibration& drive, const RigCamera& adjusted, size_t camera,
+                        const TimingUncertainty& uncertainty) {
+  const auto at = static_cast<Eigen::Index>(2 * camera);
+  const Eigen::Matrix2d independent = uncertainty.covariance.block<2, 2>(at, at);
+  const Eigen::Vector2d inflation = inflationOf<2>(independent, uncertainty.jackknife.block<2, 2>(at, at),
+                                                   Eigen::Vector2d::Constant(kLeastRatio));
+  TimingEstimate estimate{priors.timings[camera], adjusted.timing};
+  estimate.is_corrected = options.refine_timing;
+  estimate.sigmas = inflation.cwiseProduct(independent.diagonal().cwiseSqrt());
+  if (estimate.is_corrected) {
+    estimate.found.clock_offset_s += drive.time_offset_s;
+    estimate.sigmas[1] = std::hypot(estimate.sigmas[1], drive.time_offset_sigma_s);
+  } else {
+    estimate.found.readout_s += uncertainty.deviations[at];
+    estimate.found.clock_offset_s += uncertainty.deviations[at + 1];
+  }
+  return estimate;
 }
 
 /// Covariance of what is the same in all parts of the drive: directions that all patches of a camera show,
@@ -266,6 +310,9 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
   auto rig = std::make_shared<CameraRig>(*data.rig);
   rig->scale_sigma = options.scale_sigma;
   const RigUncertainty uncertainty = rigUncertainty(options, priors, data);
+  Vector6d least_ratio;
+  least_ratio << Eigen::Vector3d::Constant(kLeastRatio), Eigen::Vector3d::Constant(kLeastAngleRatio);
+  const TimingUncertainty timing = timingUncertainty(options, priors, data);
   const auto odd = calibrateHalf(options, priors, data, true);
   const auto even = calibrateHalf(options, priors, data, false);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
@@ -275,12 +322,27 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
     if (uncertainty.is_valid) {
       const auto at = static_cast<Eigen::Index>(6 * i);
       const Matrix6d schur = uncertainty.covariance.block<6, 6>(at, at);
-      camera.inflation = inflationOf(schur, uncertainty.jackknife.block<6, 6>(at, at));
+      camera.inflation = inflationOf<6>(schur, uncertainty.jackknife.block<6, 6>(at, at), least_ratio);
       camera.covariance = camera.inflation.asDiagonal() * schur * camera.inflation.asDiagonal();
+      camera.covariance += uncertainty.by_intrinsics.block<6, 6>(at, at);
       camera.covariance += commonCovariance(options, rig->cameras[i], ground_bias);
       camera.weakest_direction = describeWeakest(camera.covariance);
       rig->cameras[i].covariance = camera.covariance;
+      if (!priors.models.empty()) {
+        camera.intrinsics = intrinsicsOf(options, priors, rig->cameras[i], i, uncertainty);
+        if (camera.intrinsics->is_corrected) {
+          rig->cameras[i].focal_sigma = camera.intrinsics->sigmas[0];
+          rig->cameras[i].principal_point_sigma_px = camera.intrinsics->sigmas.tail<2>().maxCoeff();
+        }
+      }
     }
+  }
+  for (size_t i = 0; i < rig->cameras.size() && timing.deviations.size() > 0; ++i) {
+    const TimingEstimate estimate = timingOf(options, priors, *result, rig->cameras[i], i, timing);
+    if (estimate.is_corrected) {
+      rig->cameras[i].timing = estimate.found.normalized();
+    }
+    result->cameras[i].timing = estimate;
   }
   result->rig = rig;
   findVerdict(result);

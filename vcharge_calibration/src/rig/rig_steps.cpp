@@ -18,7 +18,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kNumStages = 9;
+constexpr int kNumStages = 9, kNumLaterStages = 8;
 /// Factor on the tolerance of ground landmarks before the first adjustment.
 constexpr double kFirstGroundFactor = 4.0;
 /// Factor on the cost tolerance of the last adjustment: the cost depends only weakly on the extrinsics.
@@ -27,10 +27,12 @@ constexpr double kFineToleranceFactor = 0.1;
 class RigSteps {
  public:
   RigSteps(const RigCalibratorOptions& options, const KeyframeImages& all_images,
-           const StageCallback& progress, ReconstructionState* state)
+           const StageCallback& progress, ReconstructionState* state,
+           std::optional<RigCalibrationState> earlier)
       : options_(options),
         all_images_(all_images),
-        stages_(kNumStages, progress, &state->report),
+        earlier_(std::move(earlier)),
+        stages_(earlier_ ? kNumLaterStages : kNumStages, progress, &state->report),
         state_(state),
         data_(&state->data),
         series_(*state) {}
@@ -39,21 +41,31 @@ class RigSteps {
     try {
       describeDrive(*state_, &result_);
       countTracked();
-      stages_.run("camera motions", [&] { initialize(); });
-      stages_.run("first adjustment", [&] { adjustFirst(); });
+      addKnownCameras(*data_->rig, &priors_);
+      if (earlier_) {
+        stages_.run("new keyframes", [&] { goOn(); });
+      } else {
+        stages_.run("camera motions", [&] { initialize(); });
+        stages_.run("first adjustment", [&] { adjustFirst(); });
+      }
       stages_.run("loops", [&] { closeAllLoops(); });
       stages_.run("landmark search", [&] { searchAndAdjust(); });
       correctTimeOffset(series_, state_, &result_);
       priors_.odometry = estimateOdometryNoise(options_.adjustment, *data_);
       stages_.run("between cameras", [&] {
-        result_.num_inter_camera_matches = matchBetweenCameras(options_.inter_camera, all_images_, data_);
+        result_.num_inter_camera_matches += matchBetweenCameras(options_.inter_camera, all_images_, data_,
+                                                                static_cast<size_t>(first_of_new_));
       });
       stages_.run("last search", [&] {
-        searchAndAdjust();
+        searchLandmarks(options_.search, data_, first_of_new_);
+        if (!earlier_) {  // otherwise few observations are new
+          adjust(options_.adjustment);
+        }
         checkLoops(*data_, &state_->report.loop_edges);
       });
       stages_.run("landmark patches", [&] {
-        result_.num_aligned_observations = alignLandmarks(options_.landmark_alignment, all_images_, data_);
+        result_.num_aligned_observations +=
+            alignLandmarks(options_.landmark_alignment, all_images_, data_, first_of_new_);
         adjust(options_.adjustment);
       });
       stages_.run("last adjustment", [&] { adjustFinely(); });
@@ -99,6 +111,25 @@ class RigSteps {
     data_->rig = withCameraHeights(*data_);
   }
 
+  /// Adds what was followed since the earlier calibration to its state.
+  void goOn() {
+    first_of_new_ = static_cast<int32_t>(earlier_->state.data.keyframes.size());
+    extendReconstruction(*state_, &earlier_->state);
+    *state_ = std::move(earlier_->state);
+    const RigCalibration& before = earlier_->result;
+    result_.time_offset_s = before.time_offset_s;
+    result_.num_inter_camera_matches = before.num_inter_camera_matches;
+    result_.num_aligned_observations = before.num_aligned_observations;
+    result_.first_scene = before.first_scene;
+    for (size_t i = 0; i < result_.cameras.size(); ++i) {
+      result_.cameras[i].initial = before.cameras[i].initial;
+    }
+    if (result_.time_offset_s != 0.0) {
+      series_.shift(result_.time_offset_s, state_);
+    }
+    triangulateTracks(options_.triangulation, data_);
+  }
+
   /// Finds the vertical in each camera from the ground, which needs no turn.
   void findUpDirections(const std::vector<std::vector<MotionPair>>& motions) {
     for (size_t i = 0; i < motions.size(); ++i) {
@@ -116,6 +147,7 @@ class RigSteps {
 
   void adjustFirst() {
     RigAdjustmentOptions lenient = options_.adjustment;
+    lenient.refine_intrinsics = false;  // the first landmarks are not good enough
     lenient.bundle.outlier_sigmas = INFINITY;
     lenient.max_ground_distance_m *= kFirstGroundFactor;
     triangulateTracks(options_.firstTriangulation(), data_);
@@ -129,12 +161,12 @@ class RigSteps {
 
   void closeAllLoops() {
     findAndCloseLoops(
-        options_, [&](double fraction) { stages_.tell("loops", fraction); }, state_);
+        options_, [&](double fraction) { stages_.tell("loops", fraction); }, state_, first_of_new_);
     adjust(options_.adjustment);
   }
 
   void searchAndAdjust() {
-    searchLandmarks(options_.search, data_);
+    searchLandmarks(options_.search, data_, first_of_new_);
     adjust(options_.adjustment);
   }
 
@@ -146,6 +178,8 @@ class RigSteps {
 
   const RigCalibratorOptions& options_;
   const KeyframeImages& all_images_;
+  std::optional<RigCalibrationState> earlier_;
+  int32_t first_of_new_ = 0;  // keyframe from which on matches are searched
   StageRunner stages_;
   ReconstructionState* const state_;
   ReconstructionData* const data_;
@@ -157,8 +191,9 @@ class RigSteps {
 }  // namespace
 
 RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
-                                      const StageCallback& progress, ReconstructionState* state) {
-  return RigSteps(options, all_images, progress, state).run();
+                                      const StageCallback& progress, ReconstructionState* state,
+                                      std::optional<RigCalibrationState> earlier) {
+  return RigSteps(options, all_images, progress, state, std::move(earlier)).run();
 }
 
 }  // namespace vcharge

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "rig/rig_judgement.h"
+#include "vcharge_calibration/rig/rig_calibration_text.h"
 #include "vcharge_core/base/text_format.h"
 
 namespace vcharge {
@@ -19,10 +20,15 @@ constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
 constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
 // A camera's inlier ratio divided by the median of the other cameras.
 constexpr double kWarnFit = 0.75, kFailFit = 0.65;
+// Deviations of an image that matter: over those by heat, and over their standard deviations.
+constexpr double kMaxImageRatio = 0.25, kMaxImageSigmas = 4.0;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
 constexpr double kWarnOffset_s = 0.01, kFailOffset_s = 0.3;
 constexpr int64_t kMinCommonLandmarks = 20;
+// Smaller deviations hardly move the extrinsics. Sigmas are large where the timing is wrong: the observations
+// then contradict each other.
+constexpr double kMaxReadoutDeviation_s = 0.004, kMaxClockDeviation_s = 0.002, kMaxTimingSigmas = 3.0;
 
 class RigJudge {
  public:
@@ -33,6 +39,8 @@ class RigJudge {
     for (const CameraCalibration& camera : result_->cameras) {
       judgeHalves(camera);
       judgeErrors(camera);
+      judgeIntrinsics(camera);
+      judgeTiming(camera);
     }
     judgeFit();
     judgeDrive();
@@ -112,6 +120,37 @@ class RigJudge {
       remark(Verdict::kWarn, "camera '" + camera.name + "' shares only " +
                                  std::to_string(camera.num_common_landmarks) +
                                  " landmarks with other cameras: revisit places in both directions");
+    }
+  }
+
+  /// Extrinsics make up for wrong intrinsics, with small reprojection errors.
+  void judgeIntrinsics(const CameraCalibration& camera) {
+    if (!camera.intrinsics || camera.intrinsics->is_corrected) {
+      return;
+    }
+    const IntrinsicsDeviation& found = *camera.intrinsics;
+    const Eigen::Array3d size = found.deviation.array().abs();
+    if ((size > kMaxImageRatio * found.prior_sigmas.array() && size > kMaxImageSigmas * found.sigmas.array())
+            .any()) {
+      remark(Verdict::kWarn, "camera '" + camera.name +
+                                 "': its image deviates from its intrinsics: " + describeIntrinsics(found) +
+                                 ". Calibrate the intrinsics again, or correct them by this drive with "
+                                 "adjustment.refine_intrinsics");
+    }
+  }
+
+  /// Likewise for lines that are exposed at other times than the rig says.
+  void judgeTiming(const CameraCalibration& camera) {
+    if (!camera.timing || camera.timing->is_corrected) {
+      return;
+    }
+    const Eigen::Array2d size = camera.timing->deviation().array().abs();
+    const Eigen::Array2d limit(kMaxReadoutDeviation_s, kMaxClockDeviation_s);
+    if ((size > limit && size > kMaxTimingSigmas * camera.timing->sigmas.array()).any()) {
+      remark(Verdict::kWarn, "camera '" + camera.name + "': its images look as if exposed in " +
+                                 describeTiming(*camera.timing) +
+                                 ". Give the rig readout_s and clock_offset_s, or find them by this drive "
+                                 "with adjustment.refine_timing");
     }
   }
 

@@ -81,6 +81,41 @@ TEST(RigVerdictTest, NamesTheMissingManoeuvre) {
                "camera 'front' shares only 0 landmarks");
 }
 
+TEST(RigVerdictTest, TellsThatAnImageDeviatesFromItsIntrinsics) {
+  const auto withFocalLength = [](double deviation, double sigma, bool is_corrected) {
+    return [=](RigCalibration* r) {
+      r->cameras[1].intrinsics = {{deviation, 0.1, 0.0}, {sigma, 0.1, 0.1}, {0.003, 2.0, 2.0}, is_corrected};
+    };
+  };
+  Verdict verdict = Verdict::kPass;
+  expectRemark(judge(withFocalLength(-0.0015, 0.0002, false), &verdict),
+               "camera 'left': its image deviates from its intrinsics: focal length -0.150 +- 0.020 %");
+  EXPECT_EQ(verdict, Verdict::kWarn);
+  EXPECT_EQ(judge(withFocalLength(-0.0015, 0.0005, false), &verdict), "") << "it may be noise";
+  EXPECT_EQ(judge(withFocalLength(-0.0003, 0.00001, false), &verdict), "") << "it does not matter";
+  EXPECT_EQ(judge(withFocalLength(-0.0015, 0.0002, true), &verdict), "");
+}
+
+TEST(RigVerdictTest, TellsThatLinesAreExposedAtOtherTimesThanTheRigSays) {
+  const auto withReadouts = [](double known_s, double found_s, double sigma_s, bool is_corrected) {
+    return [=](RigCalibration* r) {
+      r->cameras[1].timing = {{known_s}, {found_s}, {sigma_s, 0.001}, is_corrected};
+    };
+  };
+  Verdict verdict = Verdict::kPass;
+  expectRemark(
+      judge(withReadouts(0.0, 0.022, 0.0001, false), &verdict),
+      "camera 'left': its images look as if exposed in lines from top to bottom within 22.0 ms +- 0.10 ms, "
+      "clock offset 0.0 ms +- 1.00 ms; the rig said all at the stamp");
+  EXPECT_EQ(verdict, Verdict::kWarn);
+  expectRemark(judge(withReadouts(0.02, -0.02, 0.0001, false), &verdict),
+               "lines from bottom to top within 20.0 ms +- 0.10 ms, clock offset 0.0 ms +- 1.00 ms; the rig "
+               "said lines from top to bottom within 20.0 ms");
+  EXPECT_EQ(judge(withReadouts(0.0, 0.022, 0.01, false), &verdict), "") << "it may be noise";
+  EXPECT_EQ(judge(withReadouts(0.02, 0.021, 0.0001, false), &verdict), "") << "it does not matter";
+  EXPECT_EQ(judge(withReadouts(0.0, 0.022, 0.0001, true), &verdict), "");
+}
+
 TEST(RigVerdictTest, NamesDelayedStampsAndWrongIntrinsics) {
   Verdict verdict = Verdict::kPass;
   expectRemark(judge([](RigCalibration* r) { r->time_offset_s = 0.1; }, &verdict), "100 ms late");

@@ -16,10 +16,14 @@ RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vecto
 
 }  // namespace
 
-ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px) {
+ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px, double lean_rad,
+                                     const ImageTiming& timing) {
   ReconstructionData data;
   auto rig = std::make_shared<CameraRig>();
   rig->cameras = {makeCamera("front", 0.0, {3.6, 0.0, 0.6}), makeCamera("left", 1.57, {1.9, 0.95, 0.9})};
+  for (RigCamera& camera : rig->cameras) {
+    camera.timing = timing;
+  }
   data.rig = rig;
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, 1.0);
@@ -27,13 +31,18 @@ ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px) {
   constexpr int kHalf = 76;
   RigidTransform map_from_vehicle, odom_from_vehicle;
   for (int i = 0; i < 2 * kHalf; ++i) {
+    const double side = i < kHalf ? 1.0 : -1.0;
     Keyframe keyframe;
-    keyframe.map_from_vehicle = map_from_vehicle;
+    keyframe.map_from_vehicle =
+        map_from_vehicle *
+        RigidTransform(rotationFromYawPitchRoll(0.0, 0.0, side * lean_rad), Eigen::Vector3d::Zero());
     keyframe.odom_from_vehicle = odom_from_vehicle;
     keyframe.travelled_m = 0.5 * i;
     keyframe.images.resize(rig->cameras.size());
+    const double turn_rad = side * 0.5 / 6.0;
+    const double speed_m_per_s = 2.5 + 1.5 * std::sin(0.4 * i);
+    keyframe.rates = {speed_m_per_s, turn_rad / 0.5 * speed_m_per_s};
     data.keyframes.push_back(keyframe);
-    const double turn_rad = (i < kHalf ? 1.0 : -1.0) * 0.5 / 6.0;
     map_from_vehicle = map_from_vehicle * RigidTransform::planar(0.5 * std::cos(0.5 * turn_rad),
                                                                  0.5 * std::sin(0.5 * turn_rad), turn_rad);
     const double length_m = 0.5 + 0.002 * noise(random);
@@ -56,7 +65,7 @@ ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px) {
       for (int32_t c = 0; c < 2; ++c) {
         const RigCamera& camera = rig->cameras[c];
         const Eigen::Vector3d in_camera =
-            (data.keyframes[k].map_from_vehicle * *camera.vehicle_from_camera).inverse() * *track.position_m;
+            cameraAt(data.keyframes[k], camera).pointInCamera(*track.position_m);
         Eigen::Vector2d pixel;
         if (in_camera.norm() < 10.0 && in_camera.norm() > 0.5 && in_camera.z() > 0.1 * in_camera.norm() &&
             camera.model.project(in_camera, &pixel) && pixel.x() >= 0.0 && pixel.x() < 640.0 &&

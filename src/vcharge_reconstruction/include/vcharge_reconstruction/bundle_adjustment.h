@@ -53,6 +53,9 @@ BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, Rec
 BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data);
 /// Copies poses, points and the odometer's factors of a problem of makeBundleProblem() back to the data.
 void writeBack(const BundleProblem& problem, ReconstructionData* data);
+/// Projected minus observed position of a landmark. False if the camera does not project it.
+bool reprojectionError(const ReconstructionData& data, const Track& track,
+                       const TrackObservation& observation, Eigen::Vector2d* error_px);
 /// Removes observations and landmarks that do not fit the current poses, and lets observations that err more
 /// than their deviation says, but little, count less; computes the covariance of the remaining landmarks for
 /// fixed poses.

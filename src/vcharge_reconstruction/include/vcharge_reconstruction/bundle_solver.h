@@ -20,7 +20,8 @@ struct BundleSolution {
 BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProblem* problem);
 
 /// Uncertainty of the odometer's factors and the extrinsics of an adjusted problem; rows and columns
-/// [distance, turn, then dt, dphi of each camera].
+/// [distance, turn, then dt, dphi and, where intrinsics are unknown, the ImageDeviation, and where timing is,
+/// the TimingDeviation of each camera].
 struct BundleCovariance {
   bool is_valid = false;  ///< false if an unknown is not observable
   /// Marginal covariance (Schur complement) for independent errors with the given standard deviations.

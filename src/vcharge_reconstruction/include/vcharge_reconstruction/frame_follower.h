@@ -37,11 +37,12 @@ class FrameFollower : public DriveConsumer {
   using MatchesByCamera = std::vector<std::vector<RayMatch>>;
 
   void processFrame(const ImageFrame& frame);
-  MatchesByCamera track(const std::vector<Image>& images, const RigidTransform& odometry_motion);
+  MatchesByCamera track(const std::vector<Image>& images, const RigidTransform& odometry_motion,
+                        const VehicleRates& rates);
   /// Estimates the motion from the previous frame; ends the tracks that contradict it.
   EgoMotion estimateMotion(const MatchesByCamera& matches, const RigidTransform& odometry_motion);
-  void addKeyframe(Timestamp stamp, const std::vector<Image>& images, const RigidTransform& odom_from_vehicle,
-                   const RigidTransform& keyframe_from_vehicle, MotionHypothesis motion);
+  void addKeyframe(const ImageFrame& frame, const RigidTransform& keyframe_from_vehicle,
+                   MotionHypothesis motion);
 
   const ReconstructionOptions options_;
   const std::optional<EgoMotionOptions> ego_motion_;

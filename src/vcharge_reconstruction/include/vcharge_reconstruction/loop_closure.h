@@ -46,10 +46,11 @@ using LoopProgress = std::function<void(double)>;
 std::shared_ptr<const VocabularyTree> trainVocabulary(const ReconstructionData& data);
 
 /// Finds loop candidates for every keyframe by the features of all cameras (paper, section Loop-Closure
-/// Detection), and verifies each with verifyLoop(). Data parallel, deterministic.
+/// Detection) from `first_of_new` on, and verifies each with verifyLoop(). Data parallel, deterministic.
 std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
                                 const std::shared_ptr<const VocabularyTree>& vocabulary,
-                                const ReconstructionData& data, const LoopProgress& progress);
+                                const ReconstructionData& data, const LoopProgress& progress,
+                                int32_t first_of_new = 0);
 
 /// The same between earlier sessions and new ones, whose keyframes begin with `first_of_new`.
 std::vector<LoopEdge> findLoopsBetween(const LoopClosureOptions& options,
@@ -65,8 +66,9 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData&
                     int32_t second, const std::vector<std::pair<int, int>>& camera_pairs);
 
 /// Pose graph over all keyframes, which rejects false edges, alone or in groups (optimizeRobustly()): moves
-/// the keyframes, and sets which verified edges were accepted.
-void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data);
+/// the keyframes, and sets which verified edges were accepted. Keyframes before `first_of_new` are adjusted,
+/// and stay nearly where they are relative to each other.
+void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data, int32_t first_of_new = 0);
 
 /// Rejects accepted edges that contradict the adjusted keyframes, which depend on thousands of landmarks.
 void checkLoops(const ReconstructionData& data, std::vector<LoopEdge>* edges);

@@ -10,6 +10,7 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/frames/image.h"
+#include "vcharge_core/motion/vehicle_rates.h"
 #include "vcharge_features/feature_extractor.h"
 #include "vcharge_features/place_index.h"
 #include "vcharge_geometry/robust/robust_options.h"
@@ -80,6 +81,7 @@ struct PoseFix {
 struct RigFeatures {
   std::vector<ImageFeatures> images;             ///< one per camera; empty for a missing image
   std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< bearings of the features; zero if a pixel has none
+  VehicleRates rates;                            ///< of the vehicle at that instant
 };
 
 class LandmarkMatcher;
@@ -98,7 +100,7 @@ class MapLocalizer {
   ~MapLocalizer();
 
   /// Extracts features of the map's kind. Images are in the rig's order, empty where one is missing.
-  RigFeatures extract(const std::vector<Image>& images) const;
+  RigFeatures extract(const std::vector<Image>& images, const VehicleRates& rates) const;
 
   /// Tracking: searches for the landmarks in view of the expected pose, estimates the pose by generalized
   /// P3P, and repeats the search more narrowly around the result.

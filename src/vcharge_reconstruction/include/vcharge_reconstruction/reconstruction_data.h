@@ -9,6 +9,7 @@
 
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/moving_camera.h"
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_features/image_features.h"
@@ -27,6 +28,7 @@ struct Keyframe {
   Timestamp stamp;
   RigidTransform odom_from_vehicle;   ///< pose counted by the odometer
   RigidTransform map_from_vehicle;    ///< estimated
+  VehicleRates rates;                 ///< counted by the odometer
   double travelled_m = 0.0;           ///< distance by the odometer, since the start of the drive
   std::vector<KeyframeImage> images;  ///< in the rig's order; without features where an image is missing
   int32_t session = 0;                ///< index of the session
@@ -36,6 +38,11 @@ struct Keyframe {
 /// Deviation of observations that show their landmark, but not precisely: they are kept for their looks, and
 /// count little.
 inline constexpr double kImpreciseSigma_px = 2.5;
+
+/// A camera at a keyframe.
+inline MovingCamera cameraAt(const Keyframe& keyframe, const RigCamera& camera) {
+  return {camera, keyframe.map_from_vehicle, keyframe.rates};
+}
 
 /// Observation of a track in an image of a keyframe.
 struct TrackObservation {
@@ -51,6 +58,7 @@ struct Track {
   std::vector<TrackObservation> observations;  ///< in order of keyframes
   std::optional<Eigen::Vector3d> position_m;   ///< in the map; absent where it was not triangulated
   Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
+  int32_t joined_to = -1;          ///< the track that has its observations now; -1: itself
   int32_t map_id = kNoId;          ///< its id in an existing map
   double presence_log_odds = 0.0;  ///< as in MapLandmark
 };

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "vcharge_core/motion/trajectory.h"
+#include "vcharge_features/vocabulary_tree.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
 #include "vcharge_reconstruction/reconstruction_report.h"
 
@@ -23,6 +25,8 @@ struct ReconstructionState {
   std::vector<FramePose> frames;
   std::vector<RigidTransform> keyframe_from_next;  ///< from the motions of the frames, before adjustment
   ReconstructionReport report;
+  /// Vocabulary of the places among which loops were found; null before.
+  std::shared_ptr<const VocabularyTree> vocabulary;
 };
 
 /// Poses of all frames in the map, based on the current poses of the keyframes.

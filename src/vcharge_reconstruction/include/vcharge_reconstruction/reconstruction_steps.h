@@ -12,9 +12,15 @@ namespace vcharge {
 
 // Steps that the recipes of mapping and calibration share.
 
-/// Finds and verifies loops, closes them by a robust pose graph, and triangulates all tracks again.
+/// Adds what was followed since an adjustment to the adjusted state, which was a copy of `followed` then: its
+/// keyframes, poses of frames, and observations. New keyframes continue the adjusted path by the odometer;
+/// the odometer's poses of all keyframes are those of `followed`.
+void extendReconstruction(const ReconstructionState& followed, ReconstructionState* adjusted);
+
+/// Finds and verifies loops of keyframes from `first_of_new` on, adds them to the report, closes them by a
+/// robust pose graph, and triangulates all tracks again.
 void findAndCloseLoops(const ReconstructionOptions& options, const LoopProgress& progress,
-                       ReconstructionState* state);
+                       ReconstructionState* state, int32_t first_of_new = 0);
 
 /// Sets the number of observations and the errors of an adjustment in the report.
 void recordAdjustment(const BundleAdjustmentSummary& summary, ReconstructionReport* report);

@@ -44,20 +44,6 @@ struct TrackCheck {
   bool was_landmark = false, is_landmark = false;
 };
 
-/// Reprojection error of an observation. False if the camera does not project the landmark.
-bool reproject(const ReconstructionData& data, const Track& track, const TrackObservation& observation,
-               Eigen::Vector2d* error_px) {
-  const RigCamera& camera = data.rig->cameras[observation.camera];
-  const RigidTransform map_from_camera =
-      data.keyframes[observation.keyframe].map_from_vehicle * *camera.vehicle_from_camera;
-  Eigen::Vector2d pixel;
-  if (!camera.model.project(map_from_camera.inverse() * *track.position_m, &pixel)) {
-    return false;
-  }
-  *error_px = pixel - observation.position_px;
-  return true;
-}
-
 /// Covariance of a landmark for fixed poses: each ray fixes the position perpendicular to it, with the
 /// standard deviation of its angle times the range.
 Eigen::Matrix3d conditionalCovariance(const ReconstructionData& data, const Track& track,
@@ -68,7 +54,7 @@ Eigen::Matrix3d conditionalCovariance(const ReconstructionData& data, const Trac
   for (const TrackObservation& observation : track.observations) {
     const RigCamera& camera = data.rig->cameras[observation.camera];
     const RigidTransform map_from_camera =
-        data.keyframes[observation.keyframe].map_from_vehicle * *camera.vehicle_from_camera;
+        cameraAt(data.keyframes[observation.keyframe], camera).poseAt(observation.position_px);
     const Eigen::Vector3d to_point = *track.position_m - map_from_camera.translation();
     const Eigen::Vector3d direction = to_point.normalized();
     Eigen::Vector3d ray, shifted_ray;
@@ -96,7 +82,7 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const Reconstructi
   double min_range_m = INFINITY;
   for (TrackObservation observation : track->observations) {
     Eigen::Vector2d error_px = Eigen::Vector2d::Zero();
-    const bool is_seen = reproject(data, *track, observation, &error_px);
+    const bool is_seen = reprojectionError(data, *track, observation, &error_px);
     const bool is_precise = error_px.norm() <= options.outlier_sigmas * observation.sigma_px;
     if (!is_seen || (!is_precise && error_px.norm() > kSamePlace_px)) {
       ++result.removed;
@@ -128,6 +114,19 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const Reconstructi
 
 }  // namespace
 
+bool reprojectionError(const ReconstructionData& data, const Track& track,
+                       const TrackObservation& observation, Eigen::Vector2d* error_px) {
+  const RigCamera& camera = data.rig->cameras[observation.camera];
+  const RigidTransform map_from_camera =
+      cameraAt(data.keyframes[observation.keyframe], camera).poseAt(observation.position_px);
+  Eigen::Vector2d pixel;
+  if (!camera.model.project(map_from_camera.inverse() * *track.position_m, &pixel)) {
+    return false;
+  }
+  *error_px = pixel - observation.position_px;
+  return true;
+}
+
 BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data) {
   BundleProblem problem;
   problem.rig = data.rig;
@@ -135,6 +134,7 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Re
   problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
   for (const Keyframe& keyframe : data.keyframes) {
     problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
+    problem.rates.push_back(keyframe.rates);
   }
   for (const Track& track : data.tracks) {
     if (!track.position_m) {

@@ -22,8 +22,8 @@ Eigen::MatrixXd BundleEquations::pointInfluence(size_t point, const Eigen::Matri
       by_point += inverse.middleRows<6>(columnOf(slot.pose)).transpose() * slot.with_point;
     }
     if (hasCamera(slot)) {
-      by_point += inverse.middleRows<6>(tailColumn() + cameraInTail(slot.camera)).transpose() *
-                  slot.camera_with_point;
+      by_point += inverse.middleRows(tailColumn() + cameraInTail(slot.camera), cameraSize()).transpose() *
+                  camera_slots_[s].camera_with_point;
     }
   }
   return -by_point * points_[point].inverse;
@@ -62,8 +62,8 @@ BundleCovariance BundleEquations::covariance() {
         influence -= inverse.middleRows<6>(columnOf(pose)).transpose() * gradient;
       }
       if (hasCamera(slot)) {
-        influence -= inverse.middleRows<6>(tailColumn() + cameraInTail(slot.camera)).transpose() *
-                     (slot.by_camera.transpose() * slot.gradient);
+        influence -= inverse.middleRows(tailColumn() + cameraInTail(slot.camera), cameraSize()).transpose() *
+                     (camera_slots_[s].by_camera.transpose() * slot.gradient);
       }
     }
   });

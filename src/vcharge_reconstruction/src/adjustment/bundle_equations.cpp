@@ -1,6 +1,7 @@
 #include "adjustment/bundle_equations.h"
 
 #include <algorithm>
+#include <optional>
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -37,16 +38,40 @@ void BundleEquations::linearize(const BundleState& state) {
   tbb::parallel_for(size_t{0}, points_.size(), [&](size_t point) { linearizePoint(point); });
 }
 
-void BundleEquations::addImageErrors(const Eigen::Vector3d& point, Slot* slot) const {
+void BundleEquations::addImageErrors(const Eigen::Vector3d& point, Slot* slot, Matrix3Cd* by_camera) const {
   for (size_t i = slot->begin; i < slot->end; ++i) {
     Eigen::Vector2d error;
-    Eigen::Matrix<double, 2, 3> by_point;
-    if (errors_.reprojection(state_, problem_.observations[i], point, &error, &by_point)) {
+    Eigen::Matrix<double, 2, 3> by_point, by_deviation;
+    if (errors_.reprojection(state_, problem_.observations[i], point, &error, &by_point, &by_deviation)) {
       const Eigen::Matrix<double, 3, 2> weighted =
           errors_.robustWeight(error.squaredNorm()) * by_point.transpose();
       slot->information += weighted * by_point;
       slot->gradient += weighted * error;
+      if (by_camera != nullptr) {
+        by_camera->middleCols<3>(6) =
+            by_point.transpose() * (by_point * by_point.transpose()).inverse() * by_deviation;
+      }
     }
+  }
+}
+
+void BundleEquations::setCameraMoves(const Slot& slot, Matrix3Cd* by_camera) const {
+  Eigen::Matrix3d map_from_vehicle = state_.poses[slot.pose].rotationMatrix();
+  Eigen::Vector3d in_vehicle_m = map_from_vehicle.transpose() * slot.from_vehicle_m;
+  const BundleObservation& observation = problem_.observations[slot.begin];
+  if (const std::optional<RigidTransform> motion = errors_.motionToExposure(state_, observation)) {
+    map_from_vehicle *= motion->rotationMatrix();
+    in_vehicle_m = motion->inverse() * in_vehicle_m;
+  }
+  const Eigen::Vector3d from_camera_m = in_vehicle_m - state_.vehicle_from_camera[slot.camera].translation();
+  by_camera->leftCols<3>() = -map_from_vehicle;
+  by_camera->middleCols<3>(3) = map_from_vehicle * crossMatrix(from_camera_m);
+  if (hasTimings()) {
+    const RigCamera& camera = problem_.rig->cameras[slot.camera];
+    const Eigen::Vector3d by_time = -(map_from_vehicle * problem_.rates[slot.pose].velocityOf(in_vehicle_m));
+    by_camera->col(timingInCamera()) =
+        camera.timing.lineAt(observation.position_px, camera.image_size_px) * by_time;
+    by_camera->col(timingInCamera() + 1) = by_time;
   }
 }
 
@@ -62,7 +87,7 @@ void BundleEquations::linearizePoint(size_t point) {
   const Eigen::Vector3d& position = state_.points[point];
   const auto cameras = cameras_.begin() + static_cast<std::ptrdiff_t>(first_camera_of_point_[point]);
   const auto end_cameras = cameras_.begin() + static_cast<std::ptrdiff_t>(first_camera_of_point_[point + 1]);
-  std::for_each(cameras, end_cameras, [](CameraTerms& terms) { terms.with_point.setZero(); });
+  std::for_each(cameras, end_cameras, [&](CameraTerms& terms) { terms.with_point.setZero(cameraSize(), 3); });
   for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
     Slot& slot = slots_[s];
     slot.information.setZero();
@@ -70,21 +95,18 @@ void BundleEquations::linearizePoint(size_t point) {
     if (slot.is_ground) {
       addGroundError(&slot);
     } else {
-      addImageErrors(position, &slot);
+      addImageErrors(position, &slot, hasDeviations() ? &camera_slots_[s].by_camera : nullptr);
     }
     slot.from_vehicle_m = position - state_.poses[slot.pose].translation();
     slot.with_point.topRows<3>() = -slot.information;
     slot.with_point.bottomRows<3>() = -crossMatrix(slot.from_vehicle_m) * slot.information;
     if (hasCamera(slot)) {
-      const Eigen::Matrix3d map_from_vehicle = state_.poses[slot.pose].rotationMatrix();
-      const Eigen::Vector3d from_camera_m = map_from_vehicle.transpose() * slot.from_vehicle_m -
-                                            state_.vehicle_from_camera[slot.camera].translation();
-      slot.by_camera.leftCols<3>() = -map_from_vehicle;
-      slot.by_camera.rightCols<3>() = map_from_vehicle * crossMatrix(from_camera_m);
-      slot.camera_with_point = slot.by_camera.transpose() * slot.information;
+      CameraSlot& of_slot = camera_slots_[s];
+      setCameraMoves(slot, &of_slot.by_camera);
+      of_slot.camera_with_point = of_slot.by_camera.transpose() * slot.information;
       const auto of_camera = std::find_if(
           cameras, end_cameras, [&](const CameraTerms& terms) { return terms.camera == slot.camera; });
-      of_camera->with_point += slot.camera_with_point;
+      of_camera->with_point += of_slot.camera_with_point;
     }
   }
 }
@@ -132,11 +154,50 @@ BundleEquations::PriorTerms BundleEquations::priorTerms() const {
     terms.tail.topLeftCorner<2, 2>() += motion.by_odometer.transpose() * motion.by_odometer;
     odometer_gradient += motion.by_odometer.transpose() * motion.error;
   }
-  if (problem_.extrinsics_information.size() > 0) {
-    terms.tail.bottomRightCorner(tailSize() - 2, tailSize() - 2) += problem_.extrinsics_information;
-    terms.gradient.tail(tailSize() - 2) += problem_.extrinsics_information * errors_.cameraMoves(state_);
-  }
+  addCameraPriors(&terms);
   return terms;
+}
+
+void BundleEquations::addCameraPriors(PriorTerms* terms) const {
+  const Eigen::VectorXd moved = problem_.extrinsics_information * errors_.cameraMoves(state_);
+  for (size_t i = 0; i < problem_.prior_vehicle_from_camera.size(); ++i) {
+    const Eigen::Index row = cameraInTail(static_cast<int32_t>(i));
+    const auto own = static_cast<Eigen::Index>(6 * i);
+    terms->gradient.segment<6>(tailColumn() + row) += moved.segment<6>(own);
+    for (size_t other = 0; other < problem_.prior_vehicle_from_camera.size(); ++other) {
+      terms->tail.block<6, 6>(row, cameraInTail(static_cast<int32_t>(other))) +=
+          problem_.extrinsics_information.block<6, 6>(own, static_cast<Eigen::Index>(6 * other));
+    }
+  }
+  for (size_t i = 0; i < problem_.image_deviations.size(); ++i) {
+    const Eigen::Vector3d weights = problem_.image_deviation_sigmas[i].cwiseInverse();
+    const Eigen::Index row = cameraInTail(static_cast<int32_t>(i)) + 6;
+    terms->tail.diagonal().segment<3>(row) += weights.cwiseAbs2();
+    terms->gradient.segment<3>(tailColumn() + row) +=
+        weights.cwiseProduct(errors_.imageDeviationPrior(state_, i));
+  }
+  for (size_t i = 0; i < problem_.timing_deviations.size(); ++i) {
+    const Eigen::Vector2d weights = problem_.timing_deviation_sigmas[i].cwiseInverse();
+    const Eigen::Index row = cameraInTail(static_cast<int32_t>(i)) + timingInCamera();
+    terms->tail.diagonal().segment<2>(row) += weights.cwiseAbs2();
+    terms->gradient.segment<2>(tailColumn() + row) +=
+        weights.cwiseProduct(errors_.timingDeviationPrior(state_, i));
+  }
+  if (hasTimings()) {
+    Eigen::VectorXd by_common = Eigen::VectorXd::Zero(tailSize());
+    for (size_t i = 0; i < problem_.timing_deviations.size(); ++i) {
+      by_common[cameraInTail(static_cast<int32_t>(i)) + timingInCamera() + 1] =
+          1.0 / (static_cast<double>(problem_.timing_deviations.size()) * problem_.common_clock_sigma_s);
+    }
+    terms->tail += by_common * by_common.transpose();
+    terms->gradient.tail(tailSize()) += errors_.commonClockPrior(state_) * by_common;
+  }
+}
+
+bool BundleEquations::hasOwnDerivatives(const BundleObservation& observation) const {
+  return hasDeviations() || hasTimings() ||
+         (hasCameras() && !problem_.rates.empty() &&
+          !problem_.rig->cameras[observation.camera].timing.isInstant());
 }
 
 BundleEquations::TailTerms BundleEquations::tailTerms() const {
@@ -148,6 +209,7 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
   if (!hasCameras()) {
     return zero;
   }
+  const Eigen::Index size = cameraSize();
   // A fixed number of points per task, summed in order: the same result on any number of threads.
   constexpr size_t kPointsPerTask = 1024;
   std::vector<TailTerms> of_task((points_.size() + kPointsPerTask - 1) / kPointsPerTask, zero);
@@ -160,21 +222,22 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
         if (!hasCamera(slot)) {
           continue;
         }
+        const CameraSlot& of_camera = camera_slots_[s];
         const Eigen::Index row = cameraInTail(slot.camera);
-        const Matrix6d own = slot.camera_with_point * slot.by_camera;
-        const Vector6d gradient = slot.by_camera.transpose() * slot.gradient;
-        terms.information.block<6, 6>(row, row) += own;
-        terms.diagonal.segment<6>(row) += own.diagonal();
-        terms.gradient.segment<6>(row) += gradient;
-        terms.reduced_gradient.segment<6>(row) += gradient;
+        const auto own = (of_camera.camera_with_point * of_camera.by_camera).eval();
+        const auto gradient = (of_camera.by_camera.transpose() * slot.gradient).eval();
+        terms.information.block(row, row, size, size) += own;
+        terms.diagonal.segment(row, size) += own.diagonal();
+        terms.gradient.segment(row, size) += gradient;
+        terms.reduced_gradient.segment(row, size) += gradient;
       }
       for (size_t c = first_camera_of_point_[point]; c < first_camera_of_point_[point + 1]; ++c) {
         const Eigen::Index row = cameraInTail(cameras_[c].camera);
-        const Matrix63d over_point = cameras_[c].with_point * points_[point].inverse;
-        terms.reduced_gradient.segment<6>(row) -= over_point * points_[point].gradient;
+        const MatrixC3d over_point = cameras_[c].with_point * points_[point].inverse;
+        terms.reduced_gradient.segment(row, size) -= over_point * points_[point].gradient;
         for (size_t other = first_camera_of_point_[point]; other < first_camera_of_point_[point + 1];
              ++other) {
-          terms.information.block<6, 6>(row, cameraInTail(cameras_[other].camera)).noalias() -=
+          terms.information.block(row, cameraInTail(cameras_[other].camera), size, size).noalias() -=
               over_point * cameras_[other].with_point.transpose();
         }
       }
@@ -244,10 +307,10 @@ void BundleEquations::assemblePose(size_t pose, double damping, PriorTerms* prio
     for (const size_t s : slots_of_pose_[pose]) {
       const Slot& slot = slots_[s];
       const auto withCamera = [&](int32_t camera) {
-        return priors->with_tail.block<6, 6>(columnOf(pose), cameraInTail(camera));
+        return priors->with_tail.block(columnOf(pose), cameraInTail(camera), 6, cameraSize());
       };
       if (hasCamera(slot)) {
-        withCamera(slot.camera).noalias() += slot.with_point * slot.by_camera;
+        withCamera(slot.camera).noalias() += slot.with_point * camera_slots_[s].by_camera;
       }
       for (size_t c = first_camera_of_point_[slot.point]; c < first_camera_of_point_[slot.point + 1]; ++c) {
         withCamera(cameras_[c].camera).noalias() -= slot.over_point * cameras_[c].with_point.transpose();
@@ -294,7 +357,14 @@ double BundleEquations::step(double damping, BundleState* next) {
   }
   next->odometer += change.segment<2>(tailColumn());
   for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
-    next->moveCamera(i, change.segment<6>(tailColumn() + cameraInTail(static_cast<int32_t>(i))));
+    const Eigen::Index column = tailColumn() + cameraInTail(static_cast<int32_t>(i));
+    next->moveCamera(i, change.segment<6>(column));
+    if (hasDeviations()) {
+      next->image_deviations[i] += change.segment<3>(column + 6);
+    }
+    if (hasTimings()) {
+      next->timing_deviations[i] += change.segment<2>(column + timingInCamera());
+    }
   }
   // Decrease of the linear model: d^T (damping d - gradient) / 2.
   const double by_poses = 0.5 * change.dot(damping_.cwiseProduct(change) - gradient_);
@@ -306,8 +376,8 @@ double BundleEquations::step(double damping, BundleState* next) {
                gradient += slots_[s].with_point.transpose() * change.segment<6>(columnOf(slots_[s].pose));
              }
              if (hasCamera(slots_[s])) {
-               gradient += slots_[s].camera_with_point.transpose() *
-                           change.segment<6>(tailColumn() + cameraInTail(slots_[s].camera));
+               gradient += camera_slots_[s].camera_with_point.transpose() *
+                           change.segment(tailColumn() + cameraInTail(slots_[s].camera), cameraSize());
              }
            }
            const Eigen::Vector3d move = -(terms.inverse * gradient);

@@ -21,6 +21,11 @@ namespace vcharge {
 /// All terms of a point at one pose therefore enter as one 3x3 sum, a slot. Where the extrinsics are unknown,
 /// a slot has the observations of one camera, with J_camera = J_point R_vehicle [-I, cross(point - camera)],
 /// the latter in the vehicle's frame. A ground observation has a slot of its own.
+///
+/// With unknown intrinsics, a slot has one observation. Its derivative by the camera's image deviation is
+/// written as J_point X as well: J_point has full rank, and X = J_point^T (J_point J_point^T)^-1 J_deviation.
+/// Likewise where a camera's lines are exposed one after the other: the vehicle has then moved on, and X of a
+/// change of the exposure's time is the opposite of the point's velocity in the vehicle's frame.
 class BundleEquations {
  public:
   /// Both must outlive this object.
@@ -38,9 +43,11 @@ class BundleEquations {
 
  private:
   using Matrix63d = Eigen::Matrix<double, 6, 3>;
-  using Matrix36d = Eigen::Matrix<double, 3, 6>;
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
   using Vector6d = Eigen::Matrix<double, 6, 1>;
+  // One row or column per unknown of a camera: 6, then 3 with unknown intrinsics, then 2 with unknown timing.
+  using Matrix3Cd = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 11>;
+  using MatrixC3d = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, 11, 3>;
 
   struct Slot {
     int32_t pose = 0;
@@ -53,13 +60,16 @@ class BundleEquations {
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();        ///< sum of J_point^T error
     Matrix63d with_point = Matrix63d::Zero();                  ///< J_pose^T J_point
     Matrix63d over_point = Matrix63d::Zero();  ///< with_point times the inverse of the point's information
-    Matrix36d by_camera = Matrix36d::Zero();   ///< J_camera = J_point by_camera
-    Matrix63d camera_with_point = Matrix63d::Zero();  ///< J_camera^T J_point
+  };
+  /// The terms of a slot with unknown extrinsics.
+  struct CameraSlot {
+    Matrix3Cd by_camera;          ///< J_camera = J_point by_camera
+    MatrixC3d camera_with_point;  ///< J_camera^T J_point
   };
   /// The terms of a point's slots in one camera with unknown extrinsics.
   struct CameraTerms {
     int32_t camera = 0;
-    Matrix63d with_point = Matrix63d::Zero();  ///< sum of camera_with_point
+    MatrixC3d with_point;  ///< sum of camera_with_point
   };
   struct PointTerms {
     Eigen::Vector3d gradient, damping;
@@ -90,10 +100,16 @@ class BundleEquations {
   Eigen::Index columnOf(size_t pose) const { return 6 * static_cast<Eigen::Index>(pose - firstFreePose()); }
   Eigen::Index tailColumn() const { return columnOf(problem_.map_from_vehicle.size()); }
   Eigen::Index tailSize() const {
-    return 2 + 6 * static_cast<Eigen::Index>(problem_.vehicle_from_camera.size());
+    return 2 + cameraSize() * static_cast<Eigen::Index>(problem_.vehicle_from_camera.size());
   }
-  static Eigen::Index cameraInTail(int32_t camera) { return 2 + 6 * static_cast<Eigen::Index>(camera); }
+  Eigen::Index cameraInTail(int32_t camera) const { return 2 + cameraSize() * Eigen::Index{camera}; }
   bool hasCameras() const { return !problem_.vehicle_from_camera.empty(); }
+  bool hasDeviations() const { return !problem_.image_deviations.empty(); }
+  bool hasTimings() const { return !problem_.timing_deviations.empty(); }
+  Eigen::Index timingInCamera() const { return hasDeviations() ? 9 : 6; }
+  Eigen::Index cameraSize() const { return timingInCamera() + (hasTimings() ? 2 : 0); }
+  /// Whether the derivative by a camera differs from observation to observation of a point at a pose.
+  bool hasOwnDerivatives(const BundleObservation& observation) const;
   /// Whether the slot's errors depend on unknown extrinsics.
   bool hasCamera(const Slot& slot) const { return hasCameras() && !slot.is_ground; }
 
@@ -101,10 +117,14 @@ class BundleEquations {
   void makeCameraTerms();
   void makePattern();
   void linearizePoint(size_t point);
-  void addImageErrors(const Eigen::Vector3d& point, Slot* slot) const;
+  /// `by_camera`: its columns by the image's deviation are set; null where there are none.
+  void addImageErrors(const Eigen::Vector3d& point, Slot* slot, Matrix3Cd* by_camera) const;
+  /// Derivative of the point by the extrinsics and the timing of the slot's camera.
+  void setCameraMoves(const Slot& slot, Matrix3Cd* by_camera) const;
   void addGroundError(Slot* slot) const;
   void eliminatePoint(size_t point, double damping);
   PriorTerms priorTerms() const;
+  void addCameraPriors(PriorTerms* terms) const;
   TailTerms tailTerms() const;
   void assemble(double damping);
   void assemblePose(size_t pose, double damping, PriorTerms* priors, Scratch* scratch);
@@ -116,7 +136,8 @@ class BundleEquations {
   const BundleProblem& problem_;
   const BundleErrors& errors_;
   BundleState state_;
-  std::vector<Slot> slots_;  ///< ordered by point, then by pose
+  std::vector<Slot> slots_;               ///< ordered by point, then by pose
+  std::vector<CameraSlot> camera_slots_;  ///< of slots_; empty without unknown extrinsics
   std::vector<size_t> first_slot_of_point_;
   std::vector<std::vector<size_t>> slots_of_pose_;
   std::vector<std::vector<int32_t>> rows_of_pose_;  ///< earlier poses with a common term, and itself

@@ -15,7 +15,8 @@
 namespace vcharge {
 
 BundleState BundleState::of(const BundleProblem& problem) {
-  BundleState state{problem.map_from_vehicle, problem.points_in_map, problem.odometer, {}, {}};
+  BundleState state{problem.map_from_vehicle, problem.points_in_map,    problem.odometer, {}, {},
+                    problem.image_deviations, problem.timing_deviations};
   for (size_t i = 0; i < problem.rig->cameras.size(); ++i) {
     state.vehicle_from_camera.push_back(problem.vehicle_from_camera.empty()
                                             ? *problem.rig->cameras[i].vehicle_from_camera
@@ -37,15 +38,40 @@ BundleErrors::BundleErrors(const BundleProblem& problem)
   for (const OdometerFactor& factor : problem.odometer_factors) {
     odometer_costs_.push_back(makeOdometryCost(factor.previous_from_current, factor.information));
   }
+  for (const RigCamera& camera : problem.rig->cameras) {
+    principal_points_px_.push_back(camera.model.principalPoint());
+  }
 }
 
 BundleErrors::~BundleErrors() = default;
 
+std::optional<RigidTransform> BundleErrors::motionToExposure(const BundleState& state,
+                                                             const BundleObservation& observation) const {
+  if (problem_.rates.empty()) {
+    return std::nullopt;
+  }
+  const RigCamera& camera = problem_.rig->cameras[observation.camera];
+  ImageTiming timing = camera.timing;
+  if (!state.timing_deviations.empty()) {
+    timing.readout_s += state.timing_deviations[observation.camera][0];
+    timing.clock_offset_s += state.timing_deviations[observation.camera][1];
+  }
+  if (timing.isInstant()) {
+    return std::nullopt;
+  }
+  return problem_.rates[observation.pose].motionAfter(
+      timing.exposedAt(observation.position_px, camera.image_size_px));
+}
+
 bool BundleErrors::reprojection(const BundleState& state, const BundleObservation& observation,
                                 const Eigen::Vector3d& point, Eigen::Vector2d* error,
-                                Eigen::Matrix<double, 2, 3>* by_point) const {
+                                Eigen::Matrix<double, 2, 3>* by_point,
+                                Eigen::Matrix<double, 2, 3>* by_deviation) const {
   const RigidTransform& pose = state.poses[observation.pose];
-  const RigidTransform& camera_from_vehicle = state.camera_from_vehicle[observation.camera];
+  const std::optional<RigidTransform> motion = motionToExposure(state, observation);
+  const RigidTransform camera_from_vehicle =
+      motion ? state.camera_from_vehicle[observation.camera] * motion->inverse()
+             : state.camera_from_vehicle[observation.camera];
   const Eigen::Matrix3d camera_from_map =
       (camera_from_vehicle.rotation() * pose.rotation().conjugate()).toRotationMatrix();
   const Eigen::Vector3d in_camera =
@@ -58,6 +84,20 @@ bool BundleErrors::reprojection(const BundleState& state, const BundleObservatio
   if (!seen) {
     error->setConstant(kNoImageResidual);
     return false;
+  }
+  if (!state.image_deviations.empty()) {
+    const ImageDeviation& deviation = state.image_deviations[observation.camera];
+    const double magnification = std::exp(deviation[0]);
+    const Eigen::Vector2d& centre_px = principal_points_px_[observation.camera];
+    const Eigen::Vector2d magnified_px = magnification * (pixel - centre_px);
+    pixel = centre_px + magnified_px + deviation.tail<2>();
+    if (by_point != nullptr) {
+      pixel_by_point *= magnification;
+    }
+    if (by_deviation != nullptr) {
+      *by_deviation << magnified_px / observation.sigma_px,
+          Eigen::Matrix2d::Identity() / observation.sigma_px;
+    }
   }
   *error = (pixel - observation.position_px) / observation.sigma_px;
   if (by_point != nullptr) {
@@ -110,6 +150,26 @@ Eigen::VectorXd BundleErrors::cameraMoves(const BundleState& state) const {
   return moves;
 }
 
+Eigen::Vector3d BundleErrors::imageDeviationPrior(const BundleState& state, size_t camera) const {
+  return (state.image_deviations[camera] - problem_.prior_image_deviations[camera])
+      .cwiseQuotient(problem_.image_deviation_sigmas[camera]);
+}
+
+Eigen::Vector2d BundleErrors::timingDeviationPrior(const BundleState& state, size_t camera) const {
+  return (state.timing_deviations[camera] - problem_.prior_timing_deviations[camera])
+      .cwiseQuotient(problem_.timing_deviation_sigmas[camera]);
+}
+
+double BundleErrors::commonClockPrior(const BundleState& state) const {
+  double sum_s = 0.0;
+  for (size_t i = 0; i < state.timing_deviations.size(); ++i) {
+    sum_s += state.timing_deviations[i][1] - problem_.prior_timing_deviations[i][1];
+  }
+  return state.timing_deviations.empty()
+             ? 0.0
+             : sum_s / (static_cast<double>(state.timing_deviations.size()) * problem_.common_clock_sigma_s);
+}
+
 double BundleErrors::cost(const BundleState& state) const {
   double cost = sumOverPoints(state.points.size(), [&](size_t point) {
     const Eigen::Vector3d moved_m = state.points[point] - problem_.points_in_map[point];
@@ -129,6 +189,14 @@ double BundleErrors::cost(const BundleState& state) const {
   for (size_t i = 0; i < odometer_costs_.size(); ++i) {
     cost += 0.5 * odometerFactor(state, i).error.squaredNorm();
   }
+  for (size_t i = 0; i < state.image_deviations.size(); ++i) {
+    cost += 0.5 * imageDeviationPrior(state, i).squaredNorm();
+  }
+  for (size_t i = 0; i < state.timing_deviations.size(); ++i) {
+    cost += 0.5 * timingDeviationPrior(state, i).squaredNorm();
+  }
+  const double common = commonClockPrior(state);
+  cost += 0.5 * common * common;
   const Eigen::VectorXd moves = cameraMoves(state);
   return cost + 0.5 * odometerPrior(state).squaredNorm() +
          0.5 * moves.dot(problem_.extrinsics_information * moves);

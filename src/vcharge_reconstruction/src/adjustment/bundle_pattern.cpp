@@ -10,6 +10,7 @@ namespace vcharge {
 
 void BundleEquations::makeSlots() {
   slots_of_pose_.resize(problem_.map_from_vehicle.size());
+  slots_.reserve(problem_.observations.size() + problem_.ground_observations.size());  // at most
   auto ground = problem_.ground_observations.begin();
   const auto addSlot = [&](size_t point, int32_t pose, bool is_ground, size_t begin) {
     slots_of_pose_[pose].push_back(slots_.size());
@@ -36,7 +37,7 @@ void BundleEquations::makeSlots() {
       addGround(point, observation.pose);
       const bool is_first = slots_.size() == first_slot_of_point_.back();
       if (is_first || slots_.back().is_ground || slots_.back().pose != observation.pose ||
-          (hasCameras() && slots_.back().camera != observation.camera)) {
+          (hasCameras() && slots_.back().camera != observation.camera) || hasOwnDerivatives(observation)) {
         addSlot(point, observation.pose, false, i);
         slots_.back().camera = observation.camera;
       } else {
@@ -49,6 +50,9 @@ void BundleEquations::makeSlots() {
 }
 
 void BundleEquations::makeCameraTerms() {
+  if (hasCameras()) {
+    camera_slots_.assign(slots_.size(), {Matrix3Cd::Zero(3, cameraSize()), MatrixC3d::Zero(cameraSize(), 3)});
+  }
   first_camera_of_point_.push_back(0);
   for (size_t point = 0; point < points_.size(); ++point) {
     std::set<int32_t> seen;

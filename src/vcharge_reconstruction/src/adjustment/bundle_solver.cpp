@@ -38,6 +38,21 @@ void checkProblem(const BundleProblem& problem) {
             problem.extrinsics_information.cols() == prior_size,
         "BundleProblem: expected extrinsics_information and prior_vehicle_from_camera of every camera with "
         "unknown extrinsics, or none");
+  const size_t num_deviations = problem.image_deviations.size();
+  check(num_deviations == problem.prior_image_deviations.size() &&
+            num_deviations == problem.image_deviation_sigmas.size() &&
+            (num_deviations == 0 || num_deviations == problem.vehicle_from_camera.size()),
+        "BundleProblem: expected image_deviations, their prior and sigmas of every camera with unknown "
+        "extrinsics, or none");
+  check(problem.rates.empty() || problem.rates.size() == problem.map_from_vehicle.size(),
+        "BundleProblem: expected rates of every pose, or none");
+  const size_t num_timings = problem.timing_deviations.size();
+  check(
+      num_timings == problem.prior_timing_deviations.size() &&
+          num_timings == problem.timing_deviation_sigmas.size() &&
+          (num_timings == 0 || (num_timings == problem.vehicle_from_camera.size() && !problem.rates.empty())),
+      "BundleProblem: expected timing_deviations, their prior and sigmas of every camera with unknown "
+      "extrinsics and rates, or none");
 }
 
 }  // namespace
@@ -78,6 +93,8 @@ BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProb
   problem->odometer = state.odometer;
   if (!problem->vehicle_from_camera.empty()) {
     problem->vehicle_from_camera = std::move(state.vehicle_from_camera);
+    problem->image_deviations = std::move(state.image_deviations);
+    problem->timing_deviations = std::move(state.timing_deviations);
   }
   return solution;
 }

@@ -13,8 +13,9 @@ namespace vcharge {
 namespace {
 
 /// A noisy drive with some wrong observations, from disturbed poses and points.
-BundleProblem makeProblem() {
+BundleProblem makeProblem(const std::vector<ImageTiming>& timings = {}) {
   testing::TestDriveOptions drive;
+  drive.timings = timings;
   drive.noise_px = 0.4;
   drive.odometry_scale = 1.01;
   const ReconstructionData data = testing::makeTestDrive(drive);
@@ -30,6 +31,9 @@ BundleProblem makeProblem() {
     }
     const RigidTransform& pose = data.keyframes[i].map_from_vehicle;
     problem.map_from_vehicle.emplace_back(pose.rotation(), pose.translation() + shift);
+    if (!timings.empty()) {
+      problem.rates.push_back(data.keyframes[i].rates);
+    }
     if (i > 0) {
       Eigen::Matrix<double, 6, 1> sigmas;
       sigmas << 0.005, 0.005, 0.02, 0.01, 0.01, 0.002;
@@ -133,6 +137,140 @@ TEST(BundleSolverTest, KeepsExtrinsicsAtACertainPrior) {
   }
   certain.prior_vehicle_from_camera.pop_back();
   EXPECT_THROW(solveBundle(1, 1e-3, &certain), std::logic_error);
+}
+
+/// Cameras whose focal lengths and principal points are not those of the rig's models.
+BundleProblem makeProblemOfOtherImages(const ImageDeviation& truth, double sigma) {
+  BundleProblem problem = makeProblem();
+  auto rig = std::make_shared<CameraRig>(*problem.rig);
+  for (RigCamera& camera : rig->cameras) {
+    problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
+    camera.model = camera.model.withImage(std::exp(-truth[0]), -truth.tail<2>());
+  }
+  problem.rig = rig;
+  problem.image_deviations.assign(rig->cameras.size(), ImageDeviation::Zero());
+  problem.prior_image_deviations = problem.image_deviations;
+  problem.image_deviation_sigmas.assign(rig->cameras.size(), sigma * ImageDeviation(0.01, 3.0, 3.0));
+  return problem;
+}
+
+TEST(BundleSolverTest, FindsHowImagesDeviateFromTheirModels) {
+  const ImageDeviation truth(0.008, 2.0, -1.5);
+  BundleProblem problem = makeProblemOfOtherImages(truth, 1.0);
+  BundleProblem fixed = problem;
+  fixed.image_deviations.clear();
+  EXPECT_THROW(solveBundle(1, 1e-3, &fixed), std::logic_error);
+  fixed.prior_image_deviations.clear();
+  fixed.image_deviation_sigmas.clear();
+  const double cost_of_fixed = solveBundle(40, 1e-9, &fixed).cost;
+  EXPECT_LT(solveBundle(40, 1e-9, &problem).cost, 0.97 * cost_of_fixed);
+  const BundleCovariance uncertainty = bundleCovariance(problem);
+  ASSERT_TRUE(uncertainty.is_valid);
+  for (size_t i = 0; i < problem.image_deviations.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(2 + 9 * i + 6);
+    const Eigen::Matrix3d covariance = uncertainty.covariance.block<3, 3>(row, row);
+    const Eigen::Vector3d error = problem.image_deviations[i] - truth;
+    EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 16.0)
+        << i << ": " << problem.image_deviations[i].transpose();
+    EXPECT_LT(std::sqrt(covariance(0, 0)), 0.003) << "a drive shows the focal length";
+  }
+}
+
+TEST(BundleSolverTest, EndsWhereNoImageDeviationIsBetter) {
+  BundleProblem problem = makeProblemOfOtherImages({0.003, -1.0, 0.5}, 0.5);
+  const double least = solveBundle(60, 1e-12, &problem).cost;
+  for (size_t i = 0; i < problem.image_deviations.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double step : {-0.1, 0.1}) {
+        BundleProblem moved = problem;
+        moved.image_deviations[i][axis] += (axis == 0 ? 0.01 : 1.0) * step;
+        EXPECT_GT(solveBundle(0, 1e-12, &moved).cost, least) << i << " " << axis << " " << step;
+      }
+    }
+  }
+}
+
+TEST(BundleSolverTest, KeepsImagesAtACertainPrior) {
+  BundleProblem problem = makeProblemOfOtherImages({0.008, 2.0, -1.5}, 1e-6);
+  BundleProblem fixed = problem;
+  fixed.image_deviations.clear();
+  fixed.prior_image_deviations.clear();
+  fixed.image_deviation_sigmas.clear();
+  solveBundle(5, 1e-9, &problem);
+  solveBundle(5, 1e-9, &fixed);
+  EXPECT_LT(largestDifference_m(problem, fixed), 1e-6);
+  EXPECT_LT(problem.image_deviations[0].norm(), 1e-6);
+}
+
+const std::vector<ImageTiming> kTimings = {{0.025, ReadoutDirection::kDown, 0.006},
+                                           {0.018, ReadoutDirection::kUp, -0.006}};
+
+double poseError_m(const BundleProblem& problem) {
+  const std::vector<Keyframe> truth = testing::makeTestDrive(testing::TestDriveOptions()).keyframes;
+  double squares_m2 = 0.0;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    squares_m2 +=
+        (problem.map_from_vehicle[i].translation() - truth[i].map_from_vehicle.translation()).squaredNorm();
+  }
+  return std::sqrt(squares_m2 / static_cast<double>(truth.size()));
+}
+
+TEST(BundleSolverTest, KnowsWhereTheVehicleWasWhenALineWasExposed) {
+  BundleProblem problem = makeProblem(kTimings);
+  BundleProblem at_once = problem;
+  at_once.rates.clear();
+  const double cost = solveBundle(40, 1e-9, &problem).cost;
+  EXPECT_LT(cost, 0.995 * solveBundle(40, 1e-9, &at_once).cost);
+  EXPECT_LT(poseError_m(problem), 0.02);
+  EXPECT_LT(poseError_m(problem), 0.5 * poseError_m(at_once));
+}
+
+/// A problem whose rig does not tell the cameras' timing.
+BundleProblem makeProblemOfOtherTiming(double sigma_s) {
+  BundleProblem problem = makeProblem(kTimings);
+  auto rig = std::make_shared<CameraRig>(*problem.rig);
+  for (RigCamera& camera : rig->cameras) {
+    problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
+    camera.timing.readout_s = camera.timing.clock_offset_s = 0.0;
+  }
+  problem.rig = rig;
+  problem.timing_deviations.assign(rig->cameras.size(), TimingDeviation::Zero());
+  problem.prior_timing_deviations = problem.timing_deviations;
+  problem.timing_deviation_sigmas.assign(rig->cameras.size(), TimingDeviation::Constant(sigma_s));
+  return problem;
+}
+
+TEST(BundleSolverTest, FindsReadoutTimesAndClockOffsets) {
+  BundleProblem problem = makeProblemOfOtherTiming(0.1);
+  BundleProblem without_rates = problem;
+  without_rates.rates.clear();
+  EXPECT_THROW(solveBundle(1, 1e-3, &without_rates), std::logic_error);
+  solveBundle(40, 1e-9, &problem);
+  const BundleCovariance uncertainty = bundleCovariance(problem);
+  ASSERT_TRUE(uncertainty.is_valid);
+  for (size_t i = 0; i < problem.timing_deviations.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(2 + 8 * i + 6);
+    const Eigen::Matrix2d covariance = uncertainty.covariance.block<2, 2>(row, row);
+    const TimingDeviation error =
+        problem.timing_deviations[i] - TimingDeviation(kTimings[i].readout_s, kTimings[i].clock_offset_s);
+    EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 16.0)
+        << i << ": " << problem.timing_deviations[i].transpose();
+    EXPECT_LT(std::sqrt(covariance(0, 0)), 0.004) << "a drive shows the readout time";
+  }
+}
+
+TEST(BundleSolverTest, EndsWhereNoTimingIsBetter) {
+  BundleProblem problem = makeProblemOfOtherTiming(0.1);
+  const double least = solveBundle(60, 1e-12, &problem).cost;
+  for (size_t i = 0; i < problem.timing_deviations.size(); ++i) {
+    for (int axis = 0; axis < 2; ++axis) {
+      for (const double step_s : {-0.0005, 0.0005}) {
+        BundleProblem moved = problem;
+        moved.timing_deviations[i][axis] += step_s;
+        EXPECT_GT(solveBundle(0, 1e-12, &moved).cost, least) << i << " " << axis << " " << step_s;
+      }
+    }
+  }
 }
 
 TEST(BundleSolverTest, UsesPriorsOfPointsAsCeresDoes) {

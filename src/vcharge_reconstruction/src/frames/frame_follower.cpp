@@ -79,9 +79,9 @@ void FrameFollower::processFrame(const ImageFrame& frame) {
   }
   previous_odom_from_vehicle_ = odom_from_vehicle;
   travelled_m_ += distance_m;
-  const MatchesByCamera matches = track(images, odometry_motion);
+  const MatchesByCamera matches = track(images, odometry_motion, frame.rates);
   if (is_first) {
-    addKeyframe(stamp, images, odom_from_vehicle, RigidTransform(), MotionHypothesis::kOdometry);
+    addKeyframe(frame, RigidTransform(), MotionHypothesis::kOdometry);
     return;
   }
   const Keyframe& last = state_->data.keyframes.back();
@@ -97,17 +97,18 @@ void FrameFollower::processFrame(const ImageFrame& frame) {
     map_from_vehicle_ = last.map_from_vehicle * keyframe_from_vehicle;
   }
   if (keyframes_.isDue(keyframe_from_vehicle)) {
-    addKeyframe(stamp, images, odom_from_vehicle, keyframe_from_vehicle, motion);
+    addKeyframe(frame, keyframe_from_vehicle, motion);
   } else {
     keyframes_.addFrame(stamp, keyframe_from_vehicle, motion);
   }
 }
 
 FrameFollower::MatchesByCamera FrameFollower::track(const std::vector<Image>& images,
-                                                    const RigidTransform& odometry_motion) {
+                                                    const RigidTransform& odometry_motion,
+                                                    const VehicleRates& rates) {
   MatchesByCamera matches(trackers_.size());
   tbb::parallel_for(size_t{0}, trackers_.size(), [&](size_t i) {
-    trackers_[i].track(images[i], odometry_motion, static_cast<int>(i), &matches[i]);
+    trackers_[i].track(images[i], odometry_motion, rates, static_cast<int>(i), &matches[i]);
   });
   return matches;
 }
@@ -129,12 +130,12 @@ EgoMotion FrameFollower::estimateMotion(const MatchesByCamera& matches,
   return motion;
 }
 
-void FrameFollower::addKeyframe(Timestamp stamp, const std::vector<Image>& images,
-                                const RigidTransform& odom_from_vehicle,
-                                const RigidTransform& keyframe_from_vehicle, MotionHypothesis motion) {
+void FrameFollower::addKeyframe(const ImageFrame& frame, const RigidTransform& keyframe_from_vehicle,
+                                MotionHypothesis motion) {
   Keyframe keyframe;
-  keyframe.stamp = stamp;
-  keyframe.odom_from_vehicle = odom_from_vehicle;
+  keyframe.stamp = frame.stamp;
+  keyframe.odom_from_vehicle = *frame.bridged_from_vehicle;
+  keyframe.rates = frame.rates;
   keyframe.map_from_vehicle = map_from_vehicle_;
   keyframe.travelled_m = travelled_m_;
   const int32_t index = keyframes_.addKeyframe(std::move(keyframe), keyframe_from_vehicle, motion);
@@ -145,7 +146,7 @@ void FrameFollower::addKeyframe(Timestamp stamp, const std::vector<Image>& image
     trackers_[i].addKeyframe(index, static_cast<int32_t>(i), &state_->data);
   }
   if (on_keyframe_) {
-    on_keyframe_(index, images);
+    on_keyframe_(index, frame.images);
   }
 }
 

@@ -37,9 +37,10 @@ struct LandmarkPatch {
 class LandmarkAlignment {
  public:
   LandmarkAlignment(const LandmarkAlignmentOptions& options, const KeyframeImages& images,
-                    ReconstructionData* data)
+                    int32_t first_of_new, ReconstructionData* data)
       : options_(options),
         images_(images),
+        first_of_new_(first_of_new),
         data_(*data),
         patches_(data->tracks.size()),
         seen_(data->keyframes.size() * data->rig->cameras.size()) {}
@@ -60,8 +61,7 @@ class LandmarkAlignment {
   }
 
   RigidTransform mapFromCamera(const TrackObservation& seen) const {
-    return data_.keyframes[seen.keyframe].map_from_vehicle *
-           *data_.rig->cameras[seen.camera].vehicle_from_camera;
+    return cameraAt(data_.keyframes[seen.keyframe], data_.rig->cameras[seen.camera]).poseAt(seen.position_px);
   }
 
   const CameraModel& modelOf(const TrackObservation& seen) const {
@@ -77,7 +77,8 @@ class LandmarkAlignment {
   void choosePatches() {
     for (size_t t = 0; t < data_.tracks.size(); ++t) {
       Track& track = data_.tracks[t];
-      if (!track.position_m || track.observations.size() < 2) {
+      if (!track.position_m || track.observations.size() < 2 ||
+          track.observations.back().keyframe < first_of_new_) {
         continue;
       }
       std::vector<std::pair<double, size_t>> ranges_m;
@@ -186,6 +187,7 @@ class LandmarkAlignment {
   const LandmarkAlignmentOptions& options_;
   const PatchAlignmentOptions patch_options_ = patchOptions();
   const KeyframeImages& images_;
+  const int32_t first_of_new_;
   ReconstructionData& data_;
   std::vector<LandmarkPatch> patches_;                 // one per track
   std::vector<std::vector<TrackedObservation>> seen_;  // observations in each image
@@ -194,8 +196,8 @@ class LandmarkAlignment {
 }  // namespace
 
 int64_t alignLandmarks(const LandmarkAlignmentOptions& options, const KeyframeImages& images,
-                       ReconstructionData* data) {
-  return LandmarkAlignment(options, images, data).run();
+                       ReconstructionData* data, int32_t first_of_new) {
+  return LandmarkAlignment(options, images, first_of_new, data).run();
 }
 
 }  // namespace vcharge

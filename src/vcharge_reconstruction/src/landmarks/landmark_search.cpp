@@ -2,16 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <set>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <tbb/parallel_for.h>
 
+#include "landmarks/track_observations.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_features/descriptor_matching.h"
 
@@ -44,10 +45,17 @@ struct Proposal {
   int32_t keyframe, camera, feature, track;
 };
 
+/// True for two keyframes, by number, that are compared with each other.
+using AreCompared = std::function<bool(int32_t, int32_t)>;
+
 class LandmarkSearch {
  public:
-  LandmarkSearch(const LandmarkSearchOptions& options, const ReconstructionData& data, int32_t first_of_new)
-      : options_(options), data_(data), first_of_new_(first_of_new), observed_(data.keyframes.size()) {
+  LandmarkSearch(const LandmarkSearchOptions& options, const ReconstructionData& data,
+                 AreCompared are_compared)
+      : options_(options),
+        data_(data),
+        are_compared_(std::move(are_compared)),
+        observed_(data.keyframes.size()) {
     for (size_t t = 0; t < data.tracks.size(); ++t) {
       if (!data.tracks[t].position_m) {
         continue;
@@ -72,15 +80,11 @@ class LandmarkSearch {
   }
 
  private:
-  bool areCompared(int32_t a, int32_t b) const {
-    return a != b && (first_of_new_ == 0 || (a < first_of_new_) != (b < first_of_new_));
-  }
-
   std::vector<size_t> neighboursOf(int32_t keyframe) const {
     std::vector<size_t> neighbours;
     const Eigen::Vector3d& position = data_.keyframes[keyframe].map_from_vehicle.translation();
     for (size_t i = 0; i < data_.keyframes.size(); ++i) {
-      if (areCompared(static_cast<int32_t>(i), keyframe) &&
+      if (static_cast<int32_t>(i) != keyframe && are_compared_(static_cast<int32_t>(i), keyframe) &&
           (data_.keyframes[i].map_from_vehicle.translation() - position).norm() <= options_.max_distance_m) {
         neighbours.push_back(i);
       }
@@ -95,10 +99,7 @@ class LandmarkSearch {
 
   void searchImage(int32_t keyframe, int32_t camera, const std::vector<size_t>& neighbours,
                    std::vector<Proposal>* proposals) const {
-    const RigCamera& rig_camera = data_.rig->cameras[camera];
-    const RigidTransform map_from_camera =
-        data_.keyframes[keyframe].map_from_vehicle * *rig_camera.vehicle_from_camera;
-    const Eigen::Vector3d& centre = map_from_camera.translation();
+    const Eigen::Vector3d centre = cameraCentre(keyframe, camera);
     const double min_cos_view = std::cos(kMaxViewAngle_rad);
     std::unordered_map<int32_t, size_t> index_of_track;
     std::vector<Source> sources;
@@ -123,20 +124,21 @@ class LandmarkSearch {
         }
       }
     }
-    matchSources(keyframe, camera, map_from_camera.inverse(), sources, proposals);
+    matchSources(keyframe, camera, sources, proposals);
   }
 
-  void matchSources(int32_t keyframe, int32_t camera, const RigidTransform& camera_from_map,
-                    const std::vector<Source>& sources, std::vector<Proposal>* proposals) const {
+  void matchSources(int32_t keyframe, int32_t camera, const std::vector<Source>& sources,
+                    std::vector<Proposal>* proposals) const {
     const RigCamera& rig_camera = data_.rig->cameras[camera];
     const KeyframeImage& image = data_.keyframes[keyframe].images[camera];
+    const MovingCamera moving = cameraAt(data_.keyframes[keyframe], rig_camera);
     const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
     std::vector<cv::Point2f> predictions;
     std::vector<int32_t> tracks;
     cv::Mat descriptors(0, image.features.descriptors.cols, image.features.descriptors.type());
     descriptors.reserve(sources.size());
     for (const Source& source : sources) {
-      const Eigen::Vector3d point = camera_from_map * *data_.tracks[source.track].position_m;
+      const Eigen::Vector3d point = moving.pointInCamera(*data_.tracks[source.track].position_m);
       Eigen::Vector2d pixel;
       if (point.z() < min_cos_field * point.norm() || !rig_camera.model.project(point, &pixel) ||
           pixel.x() < 0.0 || pixel.y() < 0.0 || pixel.x() >= rig_camera.image_size_px.width ||
@@ -168,7 +170,7 @@ class LandmarkSearch {
 
   const LandmarkSearchOptions& options_;
   const ReconstructionData& data_;
-  const int32_t first_of_new_;  // 0: all keyframes are compared with each other
+  const AreCompared are_compared_;
   std::vector<std::vector<std::pair<int32_t, const TrackObservation*>>> observed_;
 };
 
@@ -252,19 +254,11 @@ void joinTracks(TrackGroups* groups, ReconstructionData* data) {
         data->tracks[root].position_m = data->tracks[t].position_m;
       }
       data->tracks[t] = Track();
+      data->tracks[t].joined_to = root;
     }
   }
   for (Track& track : data->tracks) {
-    const auto key = [](const TrackObservation& o) {
-      return std::make_tuple(o.keyframe, o.camera, o.sigma_px, o.feature < 0, o.feature);
-    };
-    std::sort(track.observations.begin(), track.observations.end(),
-              [&](const TrackObservation& a, const TrackObservation& b) { return key(a) < key(b); });
-    track.observations.erase(std::unique(track.observations.begin(), track.observations.end(),
-                                         [](const TrackObservation& a, const TrackObservation& b) {
-                                           return a.keyframe == b.keyframe && a.camera == b.camera;
-                                         }),
-                             track.observations.end());
+    sortObservations(&track);
   }
   for (Keyframe& keyframe : data->keyframes) {
     for (KeyframeImage& image : keyframe.images) {
@@ -275,12 +269,11 @@ void joinTracks(TrackGroups* groups, ReconstructionData* data) {
   }
 }
 
-/// searchLandmarksBetween(), or searchLandmarks() for first_of_new = 0.
-LandmarkSearchSummary searchAndJoin(const LandmarkSearchOptions& options, int32_t first_of_new,
+LandmarkSearchSummary searchAndJoin(const LandmarkSearchOptions& options, AreCompared are_compared,
                                     ReconstructionData* data) {
   const auto num_keyframes = static_cast<int32_t>(data->keyframes.size());
   std::vector<std::vector<Proposal>> proposals(num_keyframes);
-  const LandmarkSearch search(options, *data, first_of_new);
+  const LandmarkSearch search(options, *data, std::move(are_compared));
   tbb::parallel_for(int32_t{0}, num_keyframes, [&](int32_t i) { proposals[i] = search.searchKeyframe(i); });
 
   LandmarkSearchSummary summary;
@@ -313,14 +306,17 @@ LandmarkSearchSummary searchAndJoin(const LandmarkSearchOptions& options, int32_
 
 }  // namespace
 
-LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data) {
-  return searchAndJoin(options, 0, data);
+LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data,
+                                      int32_t first_of_new) {
+  return searchAndJoin(
+      options, [=](int32_t a, int32_t b) { return std::max(a, b) >= first_of_new; }, data);
 }
 
 LandmarkSearchSummary searchLandmarksBetween(const LandmarkSearchOptions& options, int32_t first_of_new,
                                              ReconstructionData* data) {
   check(first_of_new > 0, "searchLandmarksBetween: expected keyframes on both sides");
-  return searchAndJoin(options, first_of_new, data);
+  return searchAndJoin(
+      options, [=](int32_t a, int32_t b) { return (a < first_of_new) != (b < first_of_new); }, data);
 }
 
 }  // namespace vcharge

@@ -110,7 +110,7 @@ bool observationRay(const ReconstructionData& data, const TrackObservation& obse
     return false;
   }
   const RigidTransform map_from_camera =
-      data.keyframes[observation.keyframe].map_from_vehicle * *camera.vehicle_from_camera;
+      cameraAt(data.keyframes[observation.keyframe], camera).poseAt(observation.position_px);
   *ray_in_map = map_from_camera * Ray{Eigen::Vector3d::Zero(), ray_in_camera};
   return true;
 }

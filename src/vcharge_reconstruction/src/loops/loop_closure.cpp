@@ -14,6 +14,7 @@
 #include "vcharge_geometry/pose_graph/robust_pose_graph.h"
 #include "vcharge_geometry/robust/motion_estimation.h"
 #include "vcharge_geometry/robust/pose_estimation.h"
+#include "vcharge_reconstruction/exposed_ray.h"
 
 namespace vcharge {
 namespace {
@@ -25,10 +26,12 @@ constexpr double kMaxDisagreement_rad = 0.035;
 /// A loop edge that differs more from the adjusted keyframes is rejected.
 constexpr double kMaxFinalError_m = 0.2;
 constexpr double kMaxFinalError_rad = 0.03;
-// Standard deviations in the pose graph: of the motion between consecutive keyframes, and of a loop edge in
-// addition to its covariance.
+// Standard deviations in the pose graph: of the motion between consecutive keyframes, the same of adjusted
+// ones, and of a loop edge in addition to its covariance.
 constexpr double kStepSigma_m = 0.01;
 constexpr double kStepSigma_rad = 0.001;
+constexpr double kAdjustedSigma_m = 0.001;
+constexpr double kAdjustedSigma_rad = 0.0001;
 constexpr double kLoopSigma_m = 0.03;
 constexpr double kLoopSigma_rad = 0.003;
 // The same between sessions that nothing has joined yet.
@@ -58,10 +61,10 @@ std::vector<cv::Mat> descriptorsOf(const Keyframe& keyframe) {
 }
 
 Ray rayOf(const ReconstructionData& data, int32_t keyframe, int camera, int feature) {
-  const RigidTransform& vehicle_from_camera = *data.rig->cameras[camera].vehicle_from_camera;
-  return {
-      vehicle_from_camera.translation(),
-      vehicle_from_camera.rotation() * data.keyframes[keyframe].images[camera].rays_in_camera.col(feature)};
+  const KeyframeImage& image = data.keyframes[keyframe].images[camera];
+  const cv::Point2f position_px = image.features.keypoints[feature].position_px;
+  return rayInVehicle(data.rig->cameras[camera], image.rays_in_camera.col(feature),
+                      {position_px.x, position_px.y}, data.keyframes[keyframe].rates);
 }
 
 /// Matches between two keyframes.
@@ -299,14 +302,15 @@ PoseGraphEdge stepTo(const ReconstructionData& data, size_t i) {
 
 std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
                                 const std::shared_ptr<const VocabularyTree>& vocabulary,
-                                const ReconstructionData& data, const LoopProgress& progress) {
+                                const ReconstructionData& data, const LoopProgress& progress,
+                                int32_t first_of_new) {
   std::vector<int32_t> end_of;
   int32_t end = 0;
   for (const Keyframe& keyframe : data.keyframes) {
     while (keyframe.travelled_m - data.keyframes[end].travelled_m > options.min_travel_m) {
       ++end;
     }
-    end_of.push_back(end);
+    end_of.push_back(static_cast<int32_t>(end_of.size()) < first_of_new ? 0 : end);
   }
   return findLoopsBefore(options, vocabulary, data, end_of, progress);
 }
@@ -320,12 +324,15 @@ std::vector<LoopEdge> findLoopsBetween(const LoopClosureOptions& options,
   return findLoopsBefore(options, vocabulary, data, end_of, progress);
 }
 
-void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data) {
+void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data, int32_t first_of_new) {
   PoseGraph graph;
   for (size_t i = 0; i < data->keyframes.size(); ++i) {
     graph.map_from_node[static_cast<int64_t>(i)] = data->keyframes[i].map_from_vehicle;
     if (i > 0) {
       graph.edges.push_back(stepTo(*data, i));
+      if (static_cast<int32_t>(i) < first_of_new) {
+        graph.edges.back().information = diagonalInformation(kAdjustedSigma_m, kAdjustedSigma_rad);
+      }
     }
   }
   std::vector<size_t> loops;

@@ -10,6 +10,7 @@
 
 #include "vcharge_core/base/quantile.h"
 #include "vcharge_features/descriptor_matching.h"
+#include "vcharge_reconstruction/exposed_ray.h"
 
 namespace vcharge {
 namespace {
@@ -83,24 +84,22 @@ void LandmarkMatcher::add(const RigFeatures& features, size_t camera, const Tile
   if (ray.isZero()) {
     return;
   }
-  const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
+  const cv::Point2f position_px = features.images[camera].keypoints[static_cast<size_t>(feature)].position_px;
   const MapLandmark& landmark = observation.landmark();
   PointMatch point;
-  point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
+  point.ray = rayInVehicle(rig_->cameras[camera], ray, {position_px.x, position_px.y}, features.rates);
   point.point_m = landmark.position_m;
   point.camera = static_cast<int>(camera);
   point.quality = -distance;
   matches->points.push_back(point);
   matches->observations.push_back(
-      {landmark.id, static_cast<int32_t>(camera),
-       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px, landmark.position_m,
-       observation.numDrives()});
+      {landmark.id, static_cast<int32_t>(camera), position_px, landmark.position_m, observation.numDrives()});
 }
 
 LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
                                             const RigidTransform& map_from_vehicle, double sigma_m,
                                             double sigma_rad) const {
-  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle);
+  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle, features.rates);
   std::vector<LandmarkMatches> of_camera(rig_->cameras.size());
   tbb::parallel_for(size_t{0}, of_camera.size(), [&](size_t camera) {
     const ImageFeatures& image = features.images[camera];

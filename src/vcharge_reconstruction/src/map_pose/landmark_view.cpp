@@ -5,6 +5,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "vcharge_core/camera/moving_camera.h"
+
 namespace vcharge {
 namespace {
 
@@ -29,8 +31,8 @@ int32_t TileObservation::numDrives() const {
 }
 
 LandmarkView::LandmarkView(const TiledMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
-                           const RigidTransform& map_from_vehicle)
-    : map_(map), rig_(rig), map_from_vehicle_(map_from_vehicle) {
+                           const RigidTransform& map_from_vehicle, const VehicleRates& rates)
+    : map_(map), rig_(rig), map_from_vehicle_(map_from_vehicle), rates_(rates) {
   for (const size_t keyframe : map.keyframesNear(map_from_vehicle.translation(), options.max_distance_m,
                                                  static_cast<size_t>(options.max_keyframes))) {
     keyframes_.push_back(map.tileOf(keyframe));
@@ -72,12 +74,11 @@ std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d
 
 ExpectedLandmarks LandmarkView::expectedIn(size_t camera) const {
   const RigCamera& rig_camera = rig_.cameras[camera];
-  const RigidTransform map_from_camera = map_from_vehicle_ * *rig_camera.vehicle_from_camera;
-  const RigidTransform camera_from_map = map_from_camera.inverse();
+  const MovingCamera moving(rig_camera, map_from_vehicle_, rates_);
   const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
   ExpectedLandmarks expected;
-  for (const Source& source : sourcesFor(map_from_camera.translation())) {
-    const Eigen::Vector3d point = camera_from_map * source.observation.landmark().position_m;
+  for (const Source& source : sourcesFor(moving.mapFromCamera().translation())) {
+    const Eigen::Vector3d point = moving.pointInCamera(source.observation.landmark().position_m);
     const double range_m = point.norm();
     Eigen::Vector2d pixel;
     if (point.z() >= min_cos_field * range_m && rig_camera.model.project(point, &pixel) && pixel.x() >= 0.0 &&

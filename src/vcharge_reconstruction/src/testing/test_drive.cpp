@@ -7,6 +7,7 @@ namespace vcharge::testing {
 namespace {
 
 constexpr double kMaxRange_m = 25.0;
+constexpr double kPeriod_s = 0.2;
 
 RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vector3d& translation_m) {
   KannalaBrandtCamera::Parameters parameters;
@@ -32,18 +33,24 @@ std::shared_ptr<const CameraRig> makeTestRig() {
 
 ReconstructionData makeTestDrive(const TestDriveOptions& options) {
   ReconstructionData data;
-  data.rig = makeTestRig();
+  auto rig = std::make_shared<CameraRig>(*makeTestRig());
+  for (size_t i = 0; i < options.timings.size(); ++i) {
+    rig->cameras[i].timing = options.timings[i];
+  }
+  data.rig = rig;
   std::mt19937 random(options.seed), noise_source(options.seed + 1);
   std::uniform_real_distribution<double> coordinate(-20.0, 20.0), height(-0.2, 4.0);
   std::normal_distribution<double> noise(0.0, options.noise_px);
   RigidTransform map_from_vehicle, odom_from_vehicle;
   for (int i = 0; i < options.num_keyframes; ++i) {
     Keyframe keyframe;
-    keyframe.stamp = Timestamp::fromNanoseconds(1'000'000'000LL + 200'000'000LL * i);
+    keyframe.stamp = Timestamp::fromNanoseconds(1'000'000'000LL) + durationFromSeconds(kPeriod_s * i);
     keyframe.map_from_vehicle = map_from_vehicle;
     keyframe.odom_from_vehicle = odom_from_vehicle;
     keyframe.travelled_m = options.step_m * i;
     keyframe.images.resize(data.rig->cameras.size());
+    const double hurry = 1.0 + 0.7 * std::sin(0.9 * i);
+    keyframe.rates = {hurry * options.step_m / kPeriod_s, hurry * options.turn_rad / kPeriod_s};
     data.keyframes.push_back(keyframe);
     const double half_rad = 0.5 * options.turn_rad;
     const auto step = [&](double length_m) {
@@ -63,8 +70,7 @@ ReconstructionData makeTestDrive(const TestDriveOptions& options) {
       Track track;
       track.position_m = point;
       for (int32_t k = 0; k < options.num_keyframes; ++k) {
-        const Eigen::Vector3d in_camera =
-            (data.keyframes[k].map_from_vehicle * *rig_camera.vehicle_from_camera).inverse() * point;
+        const Eigen::Vector3d in_camera = cameraAt(data.keyframes[k], rig_camera).pointInCamera(point);
         Eigen::Vector2d pixel;
         if (in_camera.norm() < kMaxRange_m && in_camera.norm() > 1.0 &&
             in_camera.z() > std::cos(0.5 * rig_camera.field_of_view_rad) * in_camera.norm() &&

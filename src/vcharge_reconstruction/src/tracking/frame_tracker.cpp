@@ -8,6 +8,7 @@
 #include <set>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_reconstruction/exposed_ray.h"
 
 namespace vcharge {
 namespace {
@@ -118,8 +119,10 @@ CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions&
       mask_(makeFeatureMask(camera)),
       spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {}
 
-RigidTransform CameraTracker::vehicleFromCamera() const {
-  return camera_.vehicle_from_camera.value_or(RigidTransform());
+Ray CameraTracker::rayOf(const LiveTrack& track, const VehicleRates& rates) const {
+  return camera_.vehicle_from_camera
+             ? rayInVehicle(camera_, track.ray_in_camera, {track.position_px.x, track.position_px.y}, rates)
+             : Ray{Eigen::Vector3d::Zero(), track.ray_in_camera};
 }
 
 cv::Point2f CameraTracker::predict(const LiveTrack& track,
@@ -138,9 +141,11 @@ cv::Point2f CameraTracker::predict(const LiveTrack& track,
   return cv::Point2f(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
 }
 
-void CameraTracker::track(const Image& image, const RigidTransform& previous_from_current, int camera_index,
-                          std::vector<RayMatch>* matches) {
+void CameraTracker::track(const Image& image, const RigidTransform& previous_from_current,
+                          const VehicleRates& rates, int camera_index, std::vector<RayMatch>* matches) {
+  const VehicleRates previous_rates = rates_;
   image_ = image;
+  rates_ = rates;
   if (image.pixels.empty()) {
     tracks_.clear();
     anchors_.clear();
@@ -158,8 +163,6 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
     }
     const std::vector<TrackedPoint> tracked =
         patch_tracker_.track(pyramid_, current, points, mask_, predictions);
-    const RigidTransform vehicle_from_camera = vehicleFromCamera();
-    const Ray camera_ray{vehicle_from_camera.translation(), Eigen::Vector3d::Zero()};
     for (size_t i = 0; i < tracks_.size(); ++i) {
       LiveTrack next = tracks_[i];
       next.position_px = tracked[i].position_px;
@@ -170,9 +173,8 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
         continue;
       }
       RayMatch match;
-      match.previous = match.current = camera_ray;
-      match.previous.direction = vehicle_from_camera.rotation() * tracks_[i].ray_in_camera;
-      match.current.direction = vehicle_from_camera.rotation() * next.ray_in_camera;
+      match.previous = rayOf(tracks_[i], previous_rates);
+      match.current = rayOf(next, rates);
       match.previous_camera = match.current_camera = camera_index;
       matches->push_back(match);
       kept.push_back(next);

@@ -20,7 +20,7 @@ namespace vcharge {
 struct RigCalibrationSessionOptions {
   VCHARGE_BEGIN_OPTIONS(RigCalibrationSessionOptions);
   VCHARGE_OPTION(bool, calibrates_itself, false, anyValue(),
-                 "Calibrates while the drive goes on, from when it is half of what the coach asks for.");
+                 "Calibrates while the drive goes on, from half of the coach's distance on.");
   VCHARGE_OPTION(double, again_m, 20.0, notNegative(),
                  "Least distance between calibrations of a drive that goes on.");
   VCHARGE_OPTION(double, outlook_m, 2.0, positive(), "Distance between updates of the outlook.");
@@ -39,9 +39,9 @@ struct FinishedCalibration {
 /// Calibrates a rig while the vehicle is driven: feeds a RigCalibrator, updates the outlook of a
 /// CalibrationCoach, and calibrates in a separate thread from the drive so far. The drive may continue
 /// meanwhile and be calibrated again: a session that calibrates itself does so whenever the drive has become
-/// longer, and once more when the vehicle stops, so that a result is there at the end of the drive. A
-/// calibration that fails before the coach has enough is not told. The source must serialize the calls
-/// of DriveConsumer; other functions may be called from any thread.
+/// longer, and once more when the vehicle stops, so that a result is there at the end of the drive. Each
+/// goes on from the one before. A calibration that fails before the coach has enough is not told. The source
+/// must serialize the calls of DriveConsumer; other functions may be called from any thread.
 class RigCalibrationSession : public DriveConsumer {
  public:
   /// kFailed lasts until the drive continues; kCalibrated lasts until the next calibration or reset.
@@ -92,6 +92,7 @@ class RigCalibrationSession : public DriveConsumer {
   bool begin(bool is_asked_for, std::string* message);
   std::string makeJob(bool is_asked_for);
   std::shared_ptr<Job> nextJob();
+  void calibrate(Job* job, const StageCallback& progress) const;
   void run(const std::shared_ptr<Job>& job);
   void startOver();
   void updateOutlook();

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,28 @@
 #include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
 #include "vcharge_calibration/rig/rig_scene.h"
 #include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_reconstruction/bundle_problem.h"
 
 namespace vcharge {
+
+/// How a camera's image deviates from that of its known model. The drive shows it where a sigma is well below
+/// its prior.
+struct IntrinsicsDeviation {
+  ImageDeviation deviation, sigmas, prior_sigmas;
+  bool is_corrected = false;  ///< the rig has the corrected model
+};
+
+/// When a camera exposes its images, as the rig says and as the drive shows.
+struct TimingEstimate {
+  ImageTiming known, found;
+  TimingDeviation sigmas = TimingDeviation::Zero();
+  bool is_corrected = false;  ///< the rig has the timing that was found
+
+  /// Found minus known readout time, in the direction that the rig says, and clock offset.
+  TimingDeviation deviation() const {
+    return {found.readout_s - known.readout_s, found.clock_offset_s - known.clock_offset_s};
+  }
+};
 
 /// Calibration of one camera.
 struct CameraCalibration {
@@ -32,6 +53,8 @@ struct CameraCalibration {
   double rms_px = 0.0;               ///< RMS error per coordinate
   double structure_px = 0.0;         ///< RMS over the image's cells of their mean error
   std::string weakest_direction;     ///< the least certain degree of freedom, as text
+  std::optional<IntrinsicsDeviation> intrinsics;
+  std::optional<TimingEstimate> timing;
 };
 
 /// Extrinsics of a rig from a drive, or the reasons of a failure.

@@ -10,6 +10,14 @@ namespace vcharge {
 /// and remarks.
 std::string describeCalibration(const RigCalibration& result);
 
+/// Deviations of focal length and principal point with their standard deviations, and which ones the drive
+/// hardly shows.
+std::string describeIntrinsics(const IntrinsicsDeviation& found);
+
+/// Readout and clock offset of a camera with their standard deviations, and what the rig says where that is
+/// something else.
+std::string describeTiming(const TimingEstimate& timing);
+
 /// Position (x, y, z, cm) and angles (yaw, pitch, roll, degrees) of a camera; the angles are zero for an
 /// upright camera that looks forward.
 Eigen::Matrix<double, 6, 1> positionAndAngles(const RigidTransform& vehicle_from_camera);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "vcharge_calibration/rig/rig_calibration.h"
@@ -49,11 +50,22 @@ class RigCalibrator : public DriveConsumer {
   std::unique_ptr<FrameFollower> follower_;
 };
 
+/// A calibration that came as far as its verdict (it has landmarks), and the adjusted state.
+struct RigCalibrationState {
+  RigCalibration result;
+  ReconstructionState state;
+};
+
 /// The steps of RigCalibrator::finish() on a recorded state. With copies of state() and allImages() it may
 /// run while the drive goes on. Afterwards, `state` has the adjusted rig, poses and landmarks. Returns the
 /// calibration.
+///
+/// With `earlier`, a calibration of the beginning of the same drive, it goes on from there: only what came
+/// since is searched, and all is adjusted again. This takes a part of the time, and the result is as precise,
+/// but depends on where the earlier one ended.
 RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
-                                      const StageCallback& progress, ReconstructionState* state);
+                                      const StageCallback& progress, ReconstructionState* state,
+                                      std::optional<RigCalibrationState> earlier = std::nullopt);
 
 /// The map of the drive, from the state after a calibration whose verdict is not kFail.
 std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,

@@ -21,8 +21,10 @@ struct LandmarkSearchSummary {
 };
 
 /// Searches for landmarks in all images, of any camera and visit, in which the poses predict them; adds the
-/// observations; merges two landmarks that share a feature. Data parallel, deterministic.
-LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data);
+/// observations; merges two landmarks that share a feature. Keyframes before `first_of_new` are not compared
+/// with each other: they were searched before. Data parallel, deterministic.
+LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data,
+                                      int32_t first_of_new = 0);
 
 /// The same between keyframes before `first_of_new` and those from it on, where each side was searched
 /// before.

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <random>
+#include <vector>
 
 #include "vcharge_reconstruction/reconstruction_data.h"
 
@@ -19,6 +20,9 @@ struct TestDriveOptions {
   double noise_px = 0.0;        ///< standard deviation of an observed position
   int num_points = 600;
   uint32_t seed = 1;
+  /// When the two cameras expose their images; the speed then differs from keyframe to keyframe. Empty: all
+  /// pixels at the stamp.
+  std::vector<ImageTiming> timings;
 };
 
 /// A drive along a circle among random points, with true poses, and exact (or noisy) observations of every
