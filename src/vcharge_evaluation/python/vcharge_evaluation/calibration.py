@@ -9,6 +9,7 @@ import yaml
 
 from vcharge_evaluation import spoiled_drives
 from vcharge_evaluation.chain.figures import judge_rig as judge_and_draw_rig
+from vcharge_evaluation.live import rig_calibration as live_rig_calibration
 from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, import_published_images, judge_rig, run_tool, say, simulate
@@ -18,7 +19,10 @@ AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
 SCENARIO = CONFIG / "scenarios" / "calibration_figure_eight.yaml"
 USUAL_WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
 OPTIONS = {"calibrate_rig": "calibration.yaml", "calibrate_rig_from_map": "calibration_in_map.yaml"}
-PARTS = ("rigs", "kinds", "seeds", "wheels", "map", "faults", "real")
+PARTS = ("rigs", "live", "kinds", "heat", "shutters", "seeds", "wheels", "map", "faults", "real")
+# What heat does to lenses: focal lengths, relative, and principal points over the image's width.
+HEAT_FOCAL, HEAT_SHIFT = 0.002, 0.001
+READOUTS_MS = (10, 25)
 # Cameras of the rig `eight` that are calibrated together, of three camera models.
 KINDS = {"one camera": ["front"], "two without a common view": ["left", "right"],
          "two pinhole cameras and a fisheye": ["roof", "rear", "left_pillar"],
@@ -30,9 +34,8 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "calibration_evaluation")
     parser.add_argument("--parts", nargs="*", default=list(PARTS), choices=PARTS)
-    parser.add_argument("--rigs", nargs="*", default=["lot:11", "lot:12", "garage:13", "garage:14"],
-                        help="scene:rig-seed of each random rig; the scene's seed is --scene-seed")
-    parser.add_argument("--scene-seed", type=int, default=71)
+    parser.add_argument("--rigs", nargs="*", default=["lot:71:11", "lot:71:12", "garage:71:13", "garage:71:14"],
+                        help="scene:seed:rig-seed of each random rig")
     parser.add_argument("--image-scale", type=float, default=1.0, help="image size of the rigs' drives over 1280x800")
     parser.add_argument("--image-step", type=int, default=2,
                         help="use every n-th of 12.5 images a second: 2 gives 500 frames in 80 s")
@@ -45,11 +48,11 @@ class Drive:
     """A drive that was rendered without noise; read() adds noise and faults to it."""
 
     def __init__(self, args, rig, image_scale, kind="random"):
-        self.scene, rig_seed = rig.split(":")
-        self.folder = args.work / f"{self.scene}_rig{rig_seed}_{kind}_scale{image_scale:g}"
-        self.words = ["--scenario", SCENARIO, "--scene", self.scene, "--scene-seed", args.scene_seed, "--rig", kind,
-                      "--rig-seed", rig_seed, "--seed", 1000 + int(rig_seed), "--image-scale", image_scale,
-                      "--image-step", args.image_step, "--duration-s", args.duration_s]
+        scene, seed, rig_seed = rig.split(":")
+        self.folder = args.work / f"{scene}{seed}_rig{rig_seed}_{kind}_scale{image_scale:g}"
+        self.words = ["--scenario", SCENARIO, "--scene", scene, "--scene-seed", seed, "--rig", kind, "--rig-seed",
+                      rig_seed, "--seed", 1000 + int(rig_seed), "--image-scale", image_scale, "--image-step",
+                      args.image_step, "--duration-s", args.duration_s]
         simulate(self.folder, [*self.words, "--noise", "off"])
 
     def read(self, name, *words):
@@ -61,12 +64,12 @@ class Drive:
 class Calibration:
     """A rig that a tool calibrated, with its errors where it wrote one."""
 
-    def __init__(self, folder, rig, *words, tool="calibrate_rig", name="rig", truth=None):
+    def __init__(self, folder, rig, *words, tool="calibrate_rig", name="rig", truth=None, options=None):
         self.output = folder / f"{name}.yaml"
         self.output.unlink(missing_ok=True)
         say(f"{folder}: {tool} {name}")
         self.run = run_tool(tool, folder / f"{name}.log", "--bag", folder / "drive.bag", "--rig", rig, "--output",
-                            self.output, "--options", CONFIG / OPTIONS[tool], *words, may_fail=True)
+                            self.output, "--options", options or CONFIG / OPTIONS[tool], *words, may_fail=True)
         self.verdict = self.run.found.get("verdict", "none")
         self.remarks = self.run.found.get("remarks") or [self.run.error() or ""]
         self.stage_s = self.run.found.get("stage_s", {})
@@ -91,6 +94,13 @@ class Calibration:
         yield Figure("error of the common scale", 100 * (self.errors["scale"] - 1), "%")
         yield Figure("wall time", self.run.wall_s, "s")
         yield Figure("processor time", self.run.cpu_s, "s")
+
+
+def changed_options(**adjustment):
+    """The options of calibrate_rig, with others of the adjustment."""
+    values = yaml.safe_load((CONFIG / OPTIONS["calibrate_rig"]).read_text())
+    values["adjustment"].update(adjustment)
+    return values
 
 
 def judged(calibrations, num_cameras=4):
@@ -118,7 +128,7 @@ def evaluate_rigs(args, results):
         calibrations[rig] = Calibration(folder, folder / "rig_truth.yaml", "--report", folder / "report", "--map",
                                         folder / "lot.vmap")
     size = f"image scale {args.image_scale:g}"
-    results.add(f"Random rigs (scene:rig), {size}", *((rig, one.figures()) for rig, one in calibrations.items()))
+    results.add(f"Random rigs (scene:seed:rig), {size}", *((rig, one.figures()) for rig, one in calibrations.items()))
     results.add("Wall time by stage", *((rig, [Figure(stage, seconds, "s") for stage, seconds in one.stage_s.items()])
                                         for rig, one in calibrations.items()))
     results.add(f"Random rigs, goals, {size}", (" ".join(args.rigs), judged(calibrations.values())))
@@ -129,6 +139,22 @@ def evaluate_rigs(args, results):
         judge_and_draw_rig(calibrations[worst].output, folder / "rig_truth.yaml", {}, folder, folder / "rig_errors.png")
         results.show(cv2.imread(str(folder / "rig_errors.png")),
                      f"{worst}: largest translation error of a camera {100 * found[worst]:.2f} cm", found[worst])
+
+
+def evaluate_live(args, results):
+    """The nodelet calibrates the first rig while its drive is replayed in real time, and goes on when it has ended."""
+    folder = Drive(args, args.rigs[0], args.image_scale).read("right_wheels", *USUAL_WHEELS)
+    live = folder / "live"
+    after_s, peak_mb, message, *rigs = live_rig_calibration.replay(live, folder / "drive.bag", folder / "rig_truth.yaml")
+    figures = [figure("last result after the end of the drive", after_s, "s", at_most=5.0), Figure("told", message),
+               Figure("most memory", peak_mb, "MB")]
+    for when, rig in zip(("5 s after the end", "at last"), rigs):
+        errors = judge_rig(rig, folder / "rig_truth.yaml", live / f"{rig.stem}_errors.json")["without_scale"] if rig else []
+        for name, key, factor, unit in (("translation", "error_m", 100.0, "cm"),
+                                        ("rotation", "error_rad", math.degrees(1.0), "degrees")):
+            sizes = [factor * float(np.linalg.norm(camera[key])) for camera in errors]
+            figures.append(Figure(f"largest {name} error {when}", max(sizes, default=None), unit))
+    results.add(f"While the drive goes on, image scale {args.image_scale:g}", (args.rigs[0], figures))
 
 
 def evaluate_kinds(args, results):
@@ -142,6 +168,68 @@ def evaluate_kinds(args, results):
         one = Calibration(folder, part, name=f"found_{number}", truth=part)
         columns.append((kind, [Figure("cameras", len(cameras)), *one.figures(), *judged([one], len(cameras))]))
     results.add(f"Rigs of other kinds, image scale {args.image_scale:g}", *columns)
+
+
+def evaluate_heat(args, results):
+    """Intrinsics of cold lenses, kept and corrected."""
+    columns = []
+    for rig in args.rigs:
+        folder = Drive(args, rig, args.image_scale).read("right_wheels", *USUAL_WHEELS)
+        given, truth, options = folder / "cold.yaml", folder / "rig_truth.yaml", folder / "corrects.yaml"
+        options.write_text(yaml.safe_dump(changed_options(refine_intrinsics=True)))
+        deviations = spoiled_drives.write_heated_rig(truth, given, HEAT_FOCAL, HEAT_SHIFT * 1280 * args.image_scale)
+        kept = Calibration(folder, given, name="rig_cold", truth=truth)
+        one = Calibration(folder, given, name="rig_corrected", truth=truth, options=options)
+        found = [(camera["image_deviation"], deviations[camera["name"]]) for camera in one.run.found["cameras"]]
+        errors = np.array([np.subtract(deviation["values"], true) for deviation, true in found])
+        squares = np.square(errors / [deviation["standard_deviations"] for deviation, _ in found]).mean(axis=0)
+        columns.append((rig, [
+            figure("verdict, intrinsics kept", kept.verdict, equal="WARN"),
+            *(Figure(f"{figure_.name}, intrinsics kept", figure_.value, figure_.unit) for figure_ in list(kept.figures())[1:3]),
+            *list(one.figures())[:3], Figure("largest error of a focal length", 100 * float(np.abs(errors[:, 0]).max()), "%"),
+            Figure("largest error of a principal point", float(np.abs(errors[:, 1:]).max()), "px"),
+            *(figure(f"mean normalized squared error, {axis}", float(square), at_least=0.5, at_most=2.0)
+              for axis, square in zip(("focal length", "principal point across", "principal point down"), squares))]))
+    results.add(f"Focal lengths off by {100 * HEAT_FOCAL:g} %, principal points by {100 * HEAT_SHIFT:g} % of the width, "
+                f"image scale {args.image_scale:g}", *columns)
+
+
+def evaluate_shutters(args, results):
+    """Rolling shutters of which the rig says nothing, that it tells, and that the drive shows."""
+    columns = []
+    options = args.work / "finds_timing.yaml"
+    options.write_text(yaml.safe_dump(changed_options(refine_timing=True)))
+    for rig in args.rigs:
+        drive = Drive(args, rig, args.image_scale)
+        sound = drive.read("right_wheels", *USUAL_WHEELS)
+        least = Calibration(sound, sound / "rig_truth.yaml")
+        for readout_ms in READOUTS_MS:
+            folder = args.work / f"{drive.folder.name}_readout{readout_ms}"
+            simulate(folder, [*drive.words, *USUAL_WHEELS, "--set", "faults.rolling_shutter.cameras=[all]", "--set",
+                              f"faults.rolling_shutter.readout_time_s={readout_ms / 1000}"])
+            truth = folder / "rig_truth.yaml"
+            told, wrong = (spoiled_drives.write_timed_rig(truth, folder / f"{name}.yaml", readout_ms / 1000, direction)
+                           for name, direction in (("told", "down"), ("wrong", "up")))
+            kept = Calibration(folder, truth, name="rig_kept")
+            given = Calibration(folder, told, name="rig_given", truth=truth)
+            found = Calibration(folder, truth, name="rig_found", options=options)
+            misled = Calibration(folder, wrong, name="rig_misled", truth=truth)
+            timings = [camera["timing"] for camera in found.run.found["cameras"]]
+            errors = np.array([[(-1 if timing["readout_direction"] == "up" else 1) * timing["readout_s"] - readout_ms / 1000,
+                                timing["clock_offset_s"]] for timing in timings])
+            squares = np.square(errors / [timing["standard_deviations"] for timing in timings]).mean(axis=0)
+            columns.append((f"{rig}, {readout_ms} ms", [
+                *(Figure(f"{entry.name}, {name}", entry.value, entry.unit)
+                  for name, one in (("global shutter", least), ("readout unknown", kept), ("readout given", given),
+                                    ("readout found", found)) for entry in list(one.figures())[1:3]),
+                figure("verdict, readout unknown", kept.verdict, equal="WARN"),
+                figure("verdict, readout in the wrong direction", misled.verdict, equal="WARN"),
+                Figure("told", "; ".join(misled.remarks[:1])),
+                figure("largest error of a readout time", 1000 * float(np.abs(errors[:, 0]).max()), "ms", at_most=0.5),
+                figure("largest error of a clock offset", 1000 * float(np.abs(errors[:, 1]).max()), "ms", at_most=0.5),
+                *(figure(f"mean normalized squared error, {axis}", float(square), at_least=0.5, at_most=2.0)
+                  for axis, square in zip(("readout time", "clock offset"), squares))]))
+    results.add(f"Rolling shutters, image scale {args.image_scale:g}", *columns)
 
 
 def evaluate_seeds(args, results):

@@ -16,6 +16,7 @@ from vcharge_evaluation.tools import ROOT, say
 
 # Options are chosen on scenes and rigs with seeds below 100 alone, and are fixed before a test scene is rendered.
 LOTS, GARAGES, COURSES, RIGS = (201, 202, 203), (211, 212, 213), (221, 222, 223), (231, 232, 233, 234)
+NUM_RIGS = 20  # that are calibrated, each from a drive in a place of its own
 
 
 @dataclasses.dataclass
@@ -70,8 +71,9 @@ def steps():
     faults = ["--seed", LOTS[0]]
     yield Step("faults", faults, [*faults, "--image-scale", 0.3])
     yield Step("mapping", ["--seeds", *LOTS, "--image-scale", 0.5])
-    yield Step("calibration", ["--parts", "rigs", "--scene-seed", LOTS[1], "--rigs",
-                               *(f"{'lot' if i % 2 == 0 else 'garage'}:{rig}" for i, rig in enumerate(RIGS))])
+    seeds = [(scene, first + i) for i in range(NUM_RIGS // 2) for scene, first in (("lot", LOTS[0]), ("garage", GARAGES[0]))]
+    yield Step("calibration", ["--parts", "rigs", "--image-scale", 0.5, "--rigs", *(
+        f"{scene}:{seed}:{RIGS[0] + seed - LOTS[0]}" for scene, seed in seeds)])
     cars = [*(f"lot:{seed}:{rig}" for seed, rig in zip(LOTS, RIGS)),
             *(f"garage:{seed}:{rig}" for seed, rig in zip(GARAGES, RIGS))]
     yield Step("chain", ["--cars", *cars], ["--cars", cars[0], "--no-truth"])

@@ -6,16 +6,21 @@ import math
 import numpy as np
 import yaml
 
-from vcharge_evaluation.drives import Drive
+from vcharge_evaluation.drives import Drive, condition_words
 from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, judge_rig, run_tool_once, say
 
-PARTS = ("steady", "knocks", "tyre", "load", "suspension", "lens")
+PARTS = ("steady", "knocks", "power", "tyre", "load", "suspension", "lens")
 AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
 KNOCK_S = 40.0
 # Camera, axis, size (degrees), and the distance within which it must be found.
-KNOCKS = (("left", 1, 0.1, 200.0), ("front", 2, 0.5, 30.0), ("rear", 0, 0.2, 200.0))
+KNOCKS = (("left", 4, 0.1, 200.0), ("front", 5, 0.5, 30.0), ("rear", 3, 0.2, 200.0))
+# Of the knocks by size: time, cameras in turn, sizes, and whether these must be found.
+POWER_S = 25.0
+CAMERAS = ("front", "left", "rear", "right")
+POWER_TURNS = ((0.05, "degrees", False), (0.1, "degrees", True), (0.2, "degrees", True))
+POWER_SHIFTS = ((2.5, "mm", False), (5.0, "mm", True), (10.0, "mm", True))
 
 
 def arguments():
@@ -29,10 +34,26 @@ def arguments():
     return parser.parse_args()
 
 
-def make_drive(args, scene_and_seed, *words):
+def words_of_drive(args, scene_and_seed):
     scene, seed = scene_and_seed.split(":")
-    return Drive(args.work, "monitor", "--scene", scene, "--drive", "loop", "--scene-seed", seed, "--seed", int(seed) + 900,
-                 "--image-scale", args.image_scale, *(["--duration-s", args.duration_s] if args.duration_s else []), *words)
+    return ("--scene", scene, "--drive", "loop", "--scene-seed", seed, "--seed", int(seed) + 900, "--image-scale",
+            args.image_scale, *(["--duration-s", args.duration_s] if args.duration_s else []))
+
+
+def clean_drive(args, scene_and_seed):
+    """The drive at noon without noise, whose images the others of its scene share."""
+    return Drive(args.work, "monitor_clean", *words_of_drive(args, scene_and_seed), "--noise", "off")
+
+
+def make_drive(args, scene_and_seed, *words):
+    """A drive at noon, after `words` for simulate_drive that change few images."""
+    return Drive(args.work, "monitor", *words_of_drive(args, scene_and_seed), *words, "--images-from",
+                 clean_drive(args, scene_and_seed).bag)
+
+
+def render_drive(args, scene_and_seed, *words):
+    """A drive whose images are all changed by `words`."""
+    return Drive(args.work, "monitor", *words_of_drive(args, scene_and_seed), *words)
 
 
 def monitor(made, rig):
@@ -50,12 +71,12 @@ def driven_until(made, time_s):
     return float(np.linalg.norm(np.diff(rows[:, 1:4], axis=0), axis=1).sum())
 
 
-def in_camera(rig, camera, axis, turn_rad):
-    """A turn about an axis of the vehicle as a rotation vector in the camera's frame."""
-    turn = np.zeros(3)
-    turn[axis] = turn_rad
+def in_camera(rig, camera, axis, change):
+    """A turn about an axis of the vehicle, or a move along it, as a vector in the camera's frame."""
+    vector = np.zeros(3)
+    vector[axis] = change
     pose = yaml.safe_load(rig.read_text())["cameras"][camera]["vehicle_from_camera"]
-    return [round(float(value), 6) for value in rotations(np.array([pose["rotation_xyzw"]]))[0].T @ turn]
+    return [round(float(value), 6) for value in rotations(np.array([pose["rotation_xyzw"]]))[0].T @ vector]
 
 
 def errors_of(path, true_rig, name, camera):
@@ -78,8 +99,7 @@ def steady(args, results):
     alarms, distance_m, columns = 0, 0.0, []
     for scene in args.scenes:
         for condition in args.conditions:
-            words = () if condition == "noon" else ("--set", f"condition.kind={condition}")
-            made = make_drive(args, scene, *words)
+            made = make_drive(args, scene) if condition == "noon" else render_drive(args, scene, *condition_words(condition))
             run, _ = monitor(made, made.true_rig)
             found = run.found
             alarms += len(found.get("changes", ["no result"]))
@@ -93,43 +113,76 @@ def steady(args, results):
         Figure("driven", distance_m / 1e3, "km"), figure("alarms", alarms, equal=0)]))
 
 
+class Knock:
+    """A drive on which a camera is turned about an axis of the vehicle or moved along it, and what monitor_rig told of it."""
+
+    def __init__(self, args, scene, camera, axis, size, start_s):
+        true_rig = clean_drive(args, scene).true_rig
+        turn_rad, shift_m = (math.radians(size), 0.0) if axis >= 3 else (0.0, 1e-3 * size)
+        fault = {"cameras": f"[{camera}]", "start_s": start_s,
+                 "rotation_rad": in_camera(true_rig, camera, axis % 3, turn_rad),
+                 "translation_m": in_camera(true_rig, camera, axis % 3, shift_m)}
+        self.drive = make_drive(args, scene, *(
+            word for key, value in fault.items() for word in ("--set", f"faults.bumped_camera.{key}={value}")))
+        self.run, self.folder = monitor(self.drive, self.drive.truth / "rig_before.yaml")
+        self.changes = self.run.found.get("changes", [])
+        self.moved = [change for change in self.changes if change.get("camera") == camera and change["main_axis"] == axis]
+        self.is_told_right = bool(self.moved) and len(self.changes) == 1
+        self.found_after_m = self.moved[0]["found_m"] - driven_until(self.drive, start_s) if self.moved else None
+
+    def text(self):
+        return "; ".join(change["text"] for change in self.changes) or "nothing"
+
+
 def knocks(args, results):
     """A camera is turned during the drive."""
     columns, right = [], []
     for scene in args.scenes:
-        made_before = make_drive(args, scene)
         for camera, axis, size_deg, within_m in KNOCKS:
-            turn = in_camera(made_before.true_rig, camera, axis, math.radians(size_deg))
-            made = make_drive(args, scene, "--set", f"faults.bumped_camera.cameras=[{camera}]", "--set",
-                              f"faults.bumped_camera.start_s={KNOCK_S}", "--set",
-                              f"faults.bumped_camera.rotation_rad={turn}")
-            run, folder = monitor(made, made.truth / "rig_before.yaml")
-            changes = run.found.get("changes", [])
-            moved = [change for change in changes if change.get("camera") == camera and change["main_axis"] == 3 + axis]
-            right.append(bool(moved) and len(changes) == 1)
-            after_m = moved[0]["found_m"] - driven_until(made, KNOCK_S) if moved else None
-            figures = [Figure("told", "; ".join(change["text"] for change in changes) or "nothing"),
-                       figure("found after", after_m, "m", at_most=within_m), figure("other alarms",
-                                                                                     len(changes) - len(moved), equal=0)]
-            repaired, true_rig = folder / "rig.yaml", made.truth / "rig_after.yaml"
-            if repaired.exists() and run.found.get("repaired"):
-                before = errors_of(made.truth / "rig_before.yaml", true_rig, "before", camera)
+            one = Knock(args, scene, camera, axis, size_deg, KNOCK_S)
+            right.append(one.is_told_right)
+            figures = [Figure("told", one.text()), figure("found after", one.found_after_m, "m", at_most=within_m),
+                       figure("other alarms", len(one.changes) - len(one.moved), equal=0)]
+            repaired, true_rig = one.folder / "rig.yaml", one.drive.truth / "rig_after.yaml"
+            if repaired.exists() and one.run.found.get("repaired"):
+                before = errors_of(one.drive.truth / "rig_before.yaml", true_rig, "before", camera)
                 after = errors_of(repaired, true_rig, "after", camera)
                 figures += [Figure("rotation error before the repair", before[1], "degrees"),
                             figure("rotation error after the repair", after[1], "degrees", at_most=before[1]),
                             Figure("translation error after the repair", after[0], "cm")]
-            columns.append((f"{scene}, {camera} {AXES[3 + axis]} {size_deg:g} degrees", figures))
+            columns.append((f"{scene}, {camera} {AXES[axis]} {size_deg:g} degrees", figures))
     results.add(f"A camera is knocked, image scale {args.image_scale:g}", *columns)
     results.add(f"A camera is knocked, all drives, image scale {args.image_scale:g}", ("all", [
         figure("right camera and axis, nothing else", percent(sum(right), len(right)), "%", at_least=95)]))
 
 
-def told_as(args, results, title, words, part="", remark=""):
+def power(args, results):
+    """Knocks of several sizes along and about each axis: how far the car drives until they are found."""
+    columns, right, number = [], [], 0
+    for scene in args.scenes:
+        for axis, name in enumerate(AXES):
+            figures = []
+            for size, unit, is_goal in POWER_TURNS if axis >= 3 else POWER_SHIFTS:
+                one = Knock(args, scene, CAMERAS[number % len(CAMERAS)], axis, size, POWER_S)
+                number += 1
+                figures.append(figure(f"{size:g} {unit}, found after", one.found_after_m, "m",
+                                      at_most=200.0 if is_goal else None))
+                figures.append(Figure(f"{size:g} {unit}, told", one.text()))
+                if is_goal:
+                    right.append(one.is_told_right)
+            columns.append((f"{scene}, {name}", figures))
+    results.add(f"Knocks by size, image scale {args.image_scale:g}", *columns)
+    results.add(f"Knocks of 0.1 degrees and 5 mm or more, image scale {args.image_scale:g}", ("all", [
+        Figure("knocks", len(right)),
+        figure("right camera and axis, nothing else", percent(sum(right), len(right)), "%", at_least=95)]))
+
+
+def told_as(args, results, title, words, part="", remark="", make=make_drive):
     """Drives on which something other than a camera changes, after `words` for simulate_drive: told as changes of a part of
     the car, or by a remark."""
     columns = []
     for scene in args.scenes:
-        made = make_drive(args, scene, *words)
+        made = make(args, scene, *words)
         run, _ = monitor(made, made.true_rig)
         changes, remarks = run.found.get("changes", []), run.found.get("remarks", [])
         told = [change for change in changes if change["part"] == part]
@@ -151,12 +204,13 @@ def tyre(args, results):
 def load(args, results):
     """The boot is loaded."""
     told_as(args, results, "The boot is loaded", ("--set", "faults.loaded_boot.pitch_rad=0.01", "--set",
-                                                  f"faults.loaded_boot.start_s={KNOCK_S}"), part="body")
+                                                  f"faults.loaded_boot.start_s={KNOCK_S}"), part="body", make=render_drive)
 
 
 def suspension(args, results):
     """The suspension is five times as soft."""
-    told_as(args, results, "A soft suspension", ("--set", "faults.soft_suspension.pitch_factor=5"), remark="soft suspension")
+    told_as(args, results, "A soft suspension", ("--set", "faults.soft_suspension.pitch_factor=5"), remark="soft suspension",
+            make=render_drive)
 
 
 def lens(args, results):
@@ -169,9 +223,8 @@ def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("monitor", "Watching a rig", args)
-    steps = {"steady": steady, "knocks": knocks, "tyre": tyre, "load": load, "suspension": suspension, "lens": lens}
     for part in args.parts:
-        steps[part](args, results)
+        globals()[part](args, results)
     results.end()
 
 

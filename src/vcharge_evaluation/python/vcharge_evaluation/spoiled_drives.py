@@ -6,13 +6,41 @@ import rosbag
 import yaml
 
 
+def magnify(intrinsics, factor):
+    """Changes the focal lengths of a camera of any model."""
+    for key in {"gamma1", "gamma2", "fx", "fy"} & intrinsics.keys():
+        intrinsics[key] *= factor
+
+
+def write_heated_rig(rig_path, path, focal, shift_px):
+    """Writes a rig of lenses that were cold: other focal lengths (relative) and principal points, with signs that alternate
+    between the cameras. Returns what each camera's image deviates by: the focal length's logarithm, the shift."""
+    rig = yaml.safe_load(rig_path.read_text())
+    truth = {}
+    for number, (name, camera) in enumerate(rig["cameras"].items()):
+        signs = [1 - 2 * (number >> bit & 1) for bit in (0, 1)]
+        values = camera["intrinsics"]
+        magnify(values, 1 / (1 + signs[0] * focal))
+        for keys, sign in ((("u0", "cx"), signs[1]), (("v0", "cy"), -signs[0])):
+            values[next(key for key in keys if key in values)] -= sign * shift_px
+        truth[name] = [math.log1p(signs[0] * focal), signs[1] * shift_px, -signs[0] * shift_px]
+    path.write_text(yaml.safe_dump(rig, sort_keys=False))
+    return truth
+
+
+def write_timed_rig(source, path, readout_s, direction):
+    """A rig file whose cameras have rolling shutters. Returns its path."""
+    rig = yaml.safe_load(source.read_text())
+    for camera in rig["cameras"].values():
+        camera.update(readout_s=readout_s, readout_direction=direction)
+    path.write_text(yaml.safe_dump(rig, sort_keys=False))
+    return path
+
+
 def write_wrong_focal(source, target, camera="left", factor=1.05):
     """A rig file whose camera has a focal length that is too long."""
     rig = yaml.safe_load(source.read_text())
-    intrinsics = rig["cameras"][camera]["intrinsics"]
-    for key in ("gamma1", "gamma2", "fx", "fy"):
-        if key in intrinsics:
-            intrinsics[key] *= factor
+    magnify(rig["cameras"][camera]["intrinsics"], factor)
     target.write_text(yaml.safe_dump(rig, sort_keys=False))
 
 

@@ -1,4 +1,5 @@
 """Runs the suite's tools and reads what they write with --json."""
+import contextlib
 import dataclasses
 import fcntl
 import hashlib
@@ -12,6 +13,8 @@ import sys
 import time
 
 import yaml
+
+from vcharge_evaluation.live.processes import memory_mb
 
 ROOT = pathlib.Path(__file__).resolve().parents[4]
 TOOLS = ROOT / "build" / "devel" / "lib"
@@ -35,7 +38,6 @@ class Run:
         """The error's text, or None after success."""
         return self.found.get("error")
 
-
     def reason(self):
         """The error's text without the paths of files, for results."""
         return re.sub(r"\S*/\S+: ", "", self.error() or "")
@@ -52,11 +54,16 @@ def run(words, log, may_fail=False):
     start = time.monotonic()
     with open(log, "w", encoding="utf-8") as output:
         with subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT) as process:
-            _, status, usage = os.wait4(process.pid, 0)
+            ended, peak_mb = 0, 0.0
+            while not ended:
+                with contextlib.suppress(OSError):  # ru_maxrss would count what this process had when it started the program
+                    peak_mb = max(peak_mb, memory_mb(process.pid, "VmHWM"))
+                ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+                time.sleep(0 if ended else 0.02)
             process.returncode = os.waitstatus_to_exitcode(status)
     if status != 0 and not may_fail:
         raise RuntimeError(f"{' '.join(words)} failed ({status}): see {log}")
-    return Run(time.monotonic() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e9)
+    return Run(time.monotonic() - start, usage.ru_utime + usage.ru_stime, peak_mb * 1024 ** 2 / 1e9)
 
 
 def tool_path(name):

@@ -17,9 +17,10 @@ def manager_below(pid):
     return None
 
 
-def memory_mb(pid):
-    for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
+def memory_mb(pid, kind="VmRSS"):
+    """Memory of a process, by its name in /proc/PID/status: VmRSS now, VmHWM the most so far. OSError after its end."""
+    for line in pathlib.Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():
+        if line.startswith(f"{kind}:"):
             return int(line.split()[1]) / 1024
     raise OSError(f"process {pid} has no memory")
 
