@@ -13,6 +13,7 @@
 #include "vcharge_core/camera/mei_camera.h"
 #include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_dense/exposure.h"
 #include "vcharge_dense/plane_family.h"
 #include "vcharge_dense/plane_sweep_options.h"
 
@@ -40,6 +41,7 @@ struct SweepImage {
   /// Camera of a neighbour; null: the swept camera.
   std::shared_ptr<const SweepCamera> camera = nullptr;
   NeighbourNoise noise = {};
+  Exposure exposure = {};
 };
 
 /// An earlier range map of the swept camera, which predicts the next one.
@@ -81,11 +83,12 @@ class PlaneSweep {
              const std::optional<Plane>& ground_in_camera = std::nullopt,
              const PlaneAxes& axes = opticalAxis());
 
-  /// Range map of `reference`: stamp, camera and images are set, names are left empty. With `remembered` and
-  /// coarse_pass, planes are swept only in tiles whose prediction has gaps or jumps or contradicts the coarse
-  /// pass, and in one of six in turn; elsewhere the second sweep searches around the prediction. Neighbours
-  /// with a later stamp count as after it. Without neighbours all ranges are unknown. Throws std::logic_error
-  /// for images of another size or type and for more than 32 neighbours.
+  /// Range map of `reference` as seen from its pose: stamp, camera and images are set, names are left empty.
+  /// If it was exposed in lines on the move, its pixels are moved to where they would be at the stamp. With
+  /// `remembered` and coarse_pass, planes are swept only in tiles whose prediction has gaps or jumps or
+  /// contradicts the coarse pass, and in one of six in turn; elsewhere the second sweep searches around the
+  /// prediction. Neighbours with a later stamp count as after it. Without neighbours all ranges are unknown.
+  /// Throws std::logic_error for images of another size or type and for more than 32 neighbours.
   RangeMap sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
                  SweepDetails* details = nullptr, const RememberedRanges* remembered = nullptr) const;
 

@@ -147,12 +147,12 @@ void HeightMapper::keepRangeMap(const RangeTask& task, const std::string& to) {
   const StageTimer timer("range maps", &times_s_);
   const std::string path = imagePath(to, rig_->cameras[task.camera_index].name, task.reference.stamp);
   createFolder(fs::path(path).parent_path().string());
+  RangeMap map = range_mapper_->sweep(task);
   writeFileAtomically(path, [&](const std::string& temporary) {
-    if (!cv::imwrite(temporary, task.reference.pixels)) {
+    if (!cv::imwrite(temporary, map.reference)) {
       throw InputError(path + ": cannot be written (is the disk full?)");
     }
   });
-  RangeMap map = range_mapper_->sweep(task);
   map.reference.release();  // already written as a separate image
   writeRangeMap(map, to);   // writes its YAML last, which isKept() looks for
 }

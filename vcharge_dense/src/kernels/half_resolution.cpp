@@ -72,7 +72,7 @@ SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const Sweep
     halves[n].emplace(SweepNeighbour{
         PackedImage(half_pixels.neighbours[n], other_mask.empty() ? half.validMask() : other_mask),
         halved(from.camera), from.neighbour_from_reference, from.translation_m, from.after, from.noise,
-        other_mask});
+        other_mask, from.exposure, from.reference_exposure, from.reference_xi});
   });
   for (std::optional<SweepNeighbour>& neighbour : halves) {
     if (neighbour) {

@@ -48,6 +48,13 @@ struct SampleScale {
   int32_t sample(int gray) const;
 };
 
+/// An Exposure in single precision.
+struct LineMotion {
+  bool lines_are_columns;
+  float times_s[4];
+  float velocity[3], turn_rate[3];
+};
+
 /// Projects points on the reference's rays into a neighbour's PackedImage (paper, section Camera Model). A
 /// point is visible where the cosine of its angle to the axis exceeds -1/xi (xi > 1) or -xi.
 struct Projection {
@@ -56,6 +63,10 @@ struct Projection {
   float max_x, max_y;        ///< highest x and y that may be sampled
   float rotation[9];         ///< neighbour from reference, row-major
   float translation[3];
+  bool is_moving;        ///< whether the rest is used: cameras move while their lines are exposed
+  float reference_xi;    ///< of the reference's camera
+  LineMotion reference;  ///< of the reference, with the neighbour's axes
+  LineMotion neighbour;
 };
 
 /// Rays and inverse ranges of points: rotation * ray + (base + offset * weight) * translation in the

@@ -25,6 +25,63 @@ struct Positions {
   decltype(hn::Lt(VF(), VF())) seen;
 };
 
+/// Points times their inverse ranges.
+struct Points {
+  VF x, y, z;
+};
+
+HWY_INLINE VF unifiedDenominator(const Points& points, VF norm, float xi) {
+  return hn::MulAdd(hn::Set(DF(), xi), norm, points.z);
+}
+
+HWY_INLINE VF normOf(const Points& p) {
+  return root(hn::MulAdd(p.x, p.x, hn::MulAdd(p.y, p.y, hn::Mul(p.z, p.z))));
+}
+
+/// When the lines that see points are exposed, see ExposureTimes; `inverse`: of their denominators.
+HWY_INLINE VF exposureTime(const LineMotion& motion, const Points& points, VF inverse) {
+  const DF df;
+  const VF x = hn::Mul(points.x, inverse), y = hn::Mul(points.y, inverse);
+  const VF squared = hn::MulAdd(x, x, hn::Mul(y, y));
+  const float* c = motion.times_s;
+  const VF bend = hn::MulAdd(squared, hn::Set(df, c[3]), hn::Set(df, c[2]));
+  const VF slope = hn::MulAdd(squared, bend, hn::Set(df, c[1]));
+  return hn::MulAdd(motion.lines_are_columns ? x : y, slope, hn::Set(df, c[0]));
+}
+
+/// points + time * (turn rate x of + inverse range * velocity)
+HWY_INLINE Points moved(const Points& points, VF time, const LineMotion& motion, const Points& of,
+                        VF inverse_range) {
+  const DF df;
+  const VF a = hn::Set(df, motion.turn_rate[0]), b = hn::Set(df, motion.turn_rate[1]),
+           c = hn::Set(df, motion.turn_rate[2]);
+  const VF x =
+      hn::MulAdd(inverse_range, hn::Set(df, motion.velocity[0]), hn::MulSub(b, of.z, hn::Mul(c, of.y)));
+  const VF y =
+      hn::MulAdd(inverse_range, hn::Set(df, motion.velocity[1]), hn::MulSub(c, of.x, hn::Mul(a, of.z)));
+  const VF z =
+      hn::MulAdd(inverse_range, hn::Set(df, motion.velocity[2]), hn::MulSub(a, of.y, hn::Mul(b, of.x)));
+  return {hn::MulAdd(time, x, points.x), hn::MulAdd(time, y, points.y), hn::MulAdd(time, z, points.z)};
+}
+
+/// Points in the neighbour's frame when it exposed the lines that see them: from where the reference was when
+/// it exposed its line to its stamp, to the neighbour's stamp, and to the neighbour's line, which is found
+/// where the point would be seen at the stamp.
+HWY_INLINE Points seenInLines(const Projection& p, const Points& rays, const Points& at_stamps,
+                              VF inverse_range) {
+  const DF df;
+  const VF one = hn::Set(df, 1.0f);
+  const VF of_reference =
+      exposureTime(p.reference, rays, reciprocal(unifiedDenominator(rays, one, p.reference_xi)));
+  const VF back = hn::Neg(inverse_range);
+  const Points rotated{hn::MulAdd(back, hn::Set(df, p.translation[0]), at_stamps.x),
+                       hn::MulAdd(back, hn::Set(df, p.translation[1]), at_stamps.y),
+                       hn::MulAdd(back, hn::Set(df, p.translation[2]), at_stamps.z)};
+  const Points q = moved(at_stamps, of_reference, p.reference, rotated, inverse_range);
+  const VF of_neighbour = exposureTime(p.neighbour, q, reciprocal(unifiedDenominator(q, normOf(q), p.xi)));
+  return moved(q, hn::Neg(of_neighbour), p.neighbour, q, inverse_range);
+}
+
 HWY_INLINE Positions projectVector(const Projection& p, const RayRow& rays, size_t at) {
   const DF df;
   const VF inverse_range =
@@ -36,14 +93,16 @@ HWY_INLINE Positions projectVector(const Projection& p, const RayRow& rays, size
         hn::MulAdd(hn::Set(df, r[0]), x, hn::MulAdd(hn::Set(df, r[1]), y, hn::Mul(hn::Set(df, r[2]), z)));
     return hn::MulAdd(inverse_range, hn::Set(df, p.translation[axis]), rotated);
   };
-  const VF qx = transformed(0), qy = transformed(1), qz = transformed(2);
-  const VF norm = root(hn::MulAdd(qx, qx, hn::MulAdd(qy, qy, hn::Mul(qz, qz))));
-  const VF xi = hn::Set(df, p.xi);
-  const VF inverse = reciprocal(hn::MulAdd(xi, norm, qz));
-  const VF u = hn::MulAdd(hn::Mul(hn::Set(df, p.fx), qx), inverse, hn::Set(df, p.cx));
-  const VF v = hn::MulAdd(hn::Mul(hn::Set(df, p.fy), qy), inverse, hn::Set(df, p.cy));
+  Points q{transformed(0), transformed(1), transformed(2)};
+  if (p.is_moving) {
+    q = seenInLines(p, {x, y, z}, q, inverse_range);
+  }
+  const VF norm = normOf(q);
+  const VF inverse = reciprocal(unifiedDenominator(q, norm, p.xi));
+  const VF u = hn::MulAdd(hn::Mul(hn::Set(df, p.fx), q.x), inverse, hn::Set(df, p.cx));
+  const VF v = hn::MulAdd(hn::Mul(hn::Set(df, p.fy), q.y), inverse, hn::Set(df, p.cy));
   const VF min_cosine = hn::Set(df, p.xi > 1.0f ? -1.0f / p.xi : -p.xi);
-  const auto in_front = hn::Gt(qz, hn::Mul(min_cosine, norm));
+  const auto in_front = hn::Gt(q.z, hn::Mul(min_cosine, norm));
   const auto inside_u = hn::And(hn::Ge(u, hn::Set(df, p.min_x)), hn::Le(u, hn::Set(df, p.max_x)));
   const auto inside_v = hn::And(hn::Ge(v, hn::Set(df, p.min_y)), hn::Le(v, hn::Set(df, p.max_y)));
   return {u, v, hn::And(in_front, hn::And(inside_u, inside_v))};

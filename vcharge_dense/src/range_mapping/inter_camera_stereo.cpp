@@ -175,14 +175,15 @@ InterCameraStereo::InterCameraStereo(const std::vector<std::optional<StereoCamer
   }
 }
 
-std::shared_ptr<const InstantImages> InterCameraStereo::instant(Timestamp stamp,
-                                                                std::vector<cv::Mat> pixels) const {
+std::shared_ptr<const InstantImages> InterCameraStereo::instant(Timestamp stamp, std::vector<cv::Mat> pixels,
+                                                                std::vector<Exposure> exposures) const {
   check(pixels.size() == overlaps_.size(), "InterCameraStereo: expected one image per camera of the rig");
   for (size_t i = 0; i < pixels.size(); ++i) {
     check(pixels[i].empty() || (pixels[i].type() == CV_8UC1 && pixels[i].size() == overlaps_[i].size()),
           "InterCameraStereo: images must be CV_8UC1 of the working camera's size");
   }
-  return std::make_shared<InstantImages>(stamp, std::move(pixels), pairs_.size());
+  exposures.resize(overlaps_.size());
+  return std::make_shared<InstantImages>(stamp, std::move(pixels), std::move(exposures), pairs_.size());
 }
 
 bool InterCameraStereo::canMeasure(const InstantImages& images, size_t camera) const {
@@ -191,9 +192,15 @@ bool InterCameraStereo::canMeasure(const InstantImages& images, size_t camera) c
 }
 
 RangeMap InterCameraStereo::sweepSide(const InstantImages& images, const Side& side, const Side& other) {
-  const SweepImage reference{images.stamp, images.pixels[side.index](side.region), side.vehicle_from_camera};
-  const SweepImage neighbour{images.stamp, images.pixels[other.index], other.vehicle_from_camera,
-                             other.camera};
+  const SweepImage reference{images.stamp,
+                             images.pixels[side.index](side.region),
+                             side.vehicle_from_camera,
+                             nullptr,
+                             {},
+                             images.exposures[side.index]};
+  const SweepImage neighbour{
+      images.stamp, images.pixels[other.index],   other.vehicle_from_camera, other.camera,
+      {},           images.exposures[other.index]};
   const RangeMap part = side.sweep->sweep(reference, {neighbour});
   RangeMap map = pasted(part, *side.camera, side.region);
   const cv::Mat is_possible = part.range_m.mul(side.min_inverse_range_per_m) <= 1.0;  // false for NaN

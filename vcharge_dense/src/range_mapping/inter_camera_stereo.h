@@ -29,12 +29,14 @@ struct InstantImages {
     std::optional<RangeMap> maps[2];
   };
 
-  InstantImages(Timestamp stamp_, std::vector<cv::Mat> pixels_, size_t num_pairs)
-      : stamp(stamp_), pixels(std::move(pixels_)), pairs(num_pairs) {}
+  InstantImages(Timestamp stamp_, std::vector<cv::Mat> pixels_, std::vector<Exposure> exposures_,
+                size_t num_pairs)
+      : stamp(stamp_), pixels(std::move(pixels_)), exposures(std::move(exposures_)), pairs(num_pairs) {}
 
   const Timestamp stamp;
-  const std::vector<cv::Mat> pixels;    ///< CV_8UC1, in the rig's order; empty where a camera sent none
-  mutable std::vector<PairMaps> pairs;  ///< computed at their first use
+  const std::vector<cv::Mat> pixels;      ///< CV_8UC1, in the rig's order; empty where a camera sent none
+  const std::vector<Exposure> exposures;  ///< in the rig's order
+  mutable std::vector<PairMaps> pairs;    ///< computed at their first use
 };
 
 /// Ranges from the images that two cameras with a common field of view took at one instant. They are metric
@@ -58,8 +60,10 @@ class InterCameraStereo {
   /// makePlaneFamilies().
   InterCameraStereo(const std::vector<std::optional<StereoCamera>>& cameras, const PlaneSweepOptions& motion);
 
-  /// `pixels`: as in InstantImages. Throws std::logic_error for images of another size or type.
-  std::shared_ptr<const InstantImages> instant(Timestamp stamp, std::vector<cv::Mat> pixels) const;
+  /// `pixels`, `exposures`: as in InstantImages; without exposures nothing moves meanwhile. Throws
+  /// std::logic_error for images of another size or type.
+  std::shared_ptr<const InstantImages> instant(Timestamp stamp, std::vector<cv::Mat> pixels,
+                                               std::vector<Exposure> exposures = {}) const;
 
   /// Pixels of a camera that some other one sees too, where ranges can be known: CV_8UC1; all 0 without any.
   const cv::Mat& overlap(size_t camera) const { return overlaps_.at(camera); }

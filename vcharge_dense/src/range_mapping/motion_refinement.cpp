@@ -45,15 +45,20 @@ RigidTransform corrected(const RigidTransform& pose, const Vector6& correction) 
                         pose.translation() + correction.tail<3>());
 }
 
+/// A point as a camera saw it, in the vehicle's frame at the image's stamp.
+struct Sight {
+  Eigen::Vector3d ray;         // unit
+  Eigen::Vector3d position_m;  // of the camera when it exposed the point
+};
+
 /// A followed point in two frames.
 struct PointPair {
-  Eigen::Vector3d from, to;  // unit rays in the axes of the vehicle
-  double steps;              // images over which it was followed from one to the other
+  Sight from, to;
+  double steps;  // images over which it was followed from one to the other
 };
 
 /// The points of one camera in two frames.
 struct CameraPairs {
-  Eigen::Vector3d position_m;  // on the vehicle
   double noise_rad;
   std::vector<PointPair> points;
 };
@@ -67,18 +72,17 @@ struct Equations {
   /// The sine of a point's angle to its epipolar plane, and its derivatives by rotation and translation.
   void add(const RigidTransform& neighbour_from_reference, const CameraPairs& camera, const Vector6& sigma) {
     const Eigen::Matrix3d rotation = neighbour_from_reference.rotationMatrix();
-    const Eigen::Vector3d arm = rotation * camera.position_m;
-    const Eigen::Vector3d baseline = arm + neighbour_from_reference.translation() - camera.position_m;
-    const double min_length = kMinSine * baseline.norm();
     for (const PointPair& point : camera.points) {
-      const Eigen::Vector3d ray = rotation * point.from;
+      const Eigen::Vector3d arm = rotation * point.from.position_m;
+      const Eigen::Vector3d baseline = arm + neighbour_from_reference.translation() - point.to.position_m;
+      const Eigen::Vector3d ray = rotation * point.from.ray;
       const Eigen::Vector3d normal = baseline.cross(ray);
       const double length = normal.norm();
-      if (!(length > min_length)) {
+      if (!(length > kMinSine * baseline.norm())) {
         continue;
       }
-      const double error = point.to.dot(normal) / length;
-      const Eigen::Vector3d by_normal = (point.to - error * normal / length) / length;
+      const double error = point.to.ray.dot(normal) / length;
+      const Eigen::Vector3d by_normal = (point.to.ray - error * normal / length) / length;
       const Eigen::Vector3d by_baseline = ray.cross(by_normal);
       Vector6 slope;
       slope << arm.cross(by_baseline) + ray.cross(by_normal.cross(baseline)), by_baseline;
@@ -100,7 +104,9 @@ class MotionRefinement::FollowedCamera {
  public:
   explicit FollowedCamera(const Camera& camera) : camera_(camera), tracker_(trackerOptions()) {}
 
-  void add(Timestamp stamp, const cv::Mat& image, const RigidTransform& odom_from_vehicle) {
+  void add(Timestamp stamp, const cv::Mat& image, const RigidTransform& odom_from_vehicle,
+           const VehicleRates& rates) {
+    rates_ = rates;
     const RigidTransform odom_from_camera = odom_from_vehicle * camera_.vehicle_from_camera;
     ImagePyramid pyramid = tracker_.buildPyramid(image);
     follow(stamp, pyramid, odom_from_camera.inverse() * odom_from_camera_);
@@ -130,13 +136,11 @@ class MotionRefinement::FollowedCamera {
 
   CameraPairs pairs(Timestamp neighbour, Timestamp reference) const {
     // Angle of a pixel in the middle of the image, where the unified camera has its highest resolution.
-    CameraPairs result{camera_.vehicle_from_camera.translation(),
-                       kTrackNoise_px * (1.0 + camera_.model.xi()) / camera_.model.gamma1(),
-                       {}};
+    CameraPairs result{kTrackNoise_px * (1.0 + camera_.model.xi()) / camera_.model.gamma1(), {}};
     const auto add = [&](const Point& point) {
       const std::optional<size_t> from = point.at(reference), to = point.at(neighbour);
       if (from && to) {
-        result.points.push_back({point.observations[*from].ray, point.observations[*to].ray,
+        result.points.push_back({point.observations[*from].sight, point.observations[*to].sight,
                                  std::abs(static_cast<double>(*from) - static_cast<double>(*to))});
       }
     };
@@ -148,7 +152,7 @@ class MotionRefinement::FollowedCamera {
  private:
   struct Observation {
     Timestamp stamp;
-    Eigen::Vector3d ray;  // unit, in the axes of the vehicle
+    Sight sight;
   };
   struct Point {
     cv::Point2f position_px;     // in the last image
@@ -168,8 +172,18 @@ class MotionRefinement::FollowedCamera {
   bool rayOf(const cv::Point2f& position_px, Eigen::Vector3d* ray_in_camera) const {
     return camera_.model.unproject({position_px.x, position_px.y}, ray_in_camera);
   }
-  Eigen::Vector3d inVehicle(const Eigen::Vector3d& ray_in_camera) const {
-    return camera_.vehicle_from_camera.rotation() * ray_in_camera.normalized();
+  /// What the last image shows at a position.
+  Sight sightOf(const cv::Point2f& position_px, const Eigen::Vector3d& ray_in_camera) const {
+    const MeiCamera& model = camera_.model;
+    const double time_s = camera_.times.at(
+        {(position_px.x - model.u0()) / model.gamma1(), (position_px.y - model.v0()) / model.gamma2()});
+    const RigidTransform& camera = camera_.vehicle_from_camera;
+    const Sight at_exposure{camera.rotation() * ray_in_camera.normalized(), camera.translation()};
+    if (time_s == 0.0) {
+      return at_exposure;
+    }
+    const RigidTransform stamp_from_exposure = rates_.motionAfter(time_s);
+    return {stamp_from_exposure.rotation() * at_exposure.ray, stamp_from_exposure * at_exposure.position_m};
   }
 
   /// Inverse range along `ray` of a point seen along `before` earlier; within the bounds of what is useful.
@@ -210,7 +224,7 @@ class MotionRefinement::FollowedCamera {
         points_[i].position_px = found[i].position_px;
         points_[i].inverse_range_per_m =
             inverseRange(now_from_before, rays[i].normalized(), ray.normalized());
-        points_[i].observations.push_back({stamp, inVehicle(ray)});
+        points_[i].observations.push_back({stamp, sightOf(found[i].position_px, ray)});
         kept.push_back(std::move(points_[i]));
       } else if (points_[i].observations.size() > 1) {
         lost_.push_back(std::move(points_[i]));
@@ -230,7 +244,7 @@ class MotionRefinement::FollowedCamera {
     for (const cv::Point2f& corner : corners) {
       Eigen::Vector3d ray;
       if (rayOf(corner, &ray)) {
-        points_.push_back({corner, kInitialInverseRange_per_m, {{stamp, inVehicle(ray)}}});
+        points_.push_back({corner, kInitialInverseRange_per_m, {{stamp, sightOf(corner, ray)}}});
       }
     }
   }
@@ -239,6 +253,7 @@ class MotionRefinement::FollowedCamera {
   const PatchTracker tracker_;
   ImagePyramid pyramid_;             // the last image
   RigidTransform odom_from_camera_;  // at the last image
+  VehicleRates rates_;               // at the last image
   std::vector<Point> points_;        // in the last image
   std::deque<Point> lost_;           // not in it, in the order in which they were lost
 };
@@ -254,10 +269,10 @@ MotionRefinement::MotionRefinement(const std::vector<std::optional<Camera>>& cam
 MotionRefinement::~MotionRefinement() = default;
 
 void MotionRefinement::addFrame(Timestamp stamp, const std::vector<cv::Mat>& images,
-                                const RigidTransform& odom_from_vehicle) {
+                                const RigidTransform& odom_from_vehicle, const VehicleRates& rates) {
   tbb::parallel_for(size_t{0}, cameras_.size(), [&](size_t i) {
     if (cameras_[i] && !images[i].empty()) {
-      cameras_[i]->add(stamp, images[i], odom_from_vehicle);
+      cameras_[i]->add(stamp, images[i], odom_from_vehicle, rates);
     }
   });
 }
@@ -319,6 +334,23 @@ MotionRefinement::Result MotionRefinement::refine(Timestamp neighbour, Timestamp
     const Eigen::Vector3d along = result.neighbour_from_reference.translation().normalized();
     result.rotation_variance_left = variance_left.topLeftCorner<3, 3>().trace() / 3.0;
     result.translation_variance_left = along.dot(variance_left.bottomRightCorner<3, 3>() * along);
+  }
+  return result;
+}
+
+SweepImage MotionRefinement::refined(const SweepImage& neighbour, const SweepImage& reference,
+                                     const RigidTransform& vehicle_from_camera) const {
+  const RigidTransform camera_from_vehicle = vehicle_from_camera.inverse();
+  const RigidTransform neighbour_from_reference =
+      (neighbour.world_from_camera * camera_from_vehicle).inverse() *
+      (reference.world_from_camera * camera_from_vehicle);
+  const Result motion = refine(neighbour.stamp, reference.stamp, neighbour_from_reference);
+  SweepImage result = neighbour;
+  if (motion.is_refined) {
+    result.world_from_camera = reference.world_from_camera * camera_from_vehicle *
+                               motion.neighbour_from_reference.inverse() * vehicle_from_camera;
+    result.noise.rotation_left = motion.rotation_variance_left;
+    result.noise.translation_left = motion.translation_variance_left;
   }
   return result;
 }

@@ -9,7 +9,9 @@
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/mei_camera.h"
 #include "vcharge_core/motion/rigid_transform.h"
-#include "vcharge_dense/plane_sweep_options.h"
+#include "vcharge_core/motion/vehicle_rates.h"
+#include "vcharge_dense/exposure.h"
+#include "vcharge_dense/plane_sweep.h"
 
 namespace vcharge {
 
@@ -30,6 +32,7 @@ class MotionRefinement {
     MeiCamera model;
     cv::Mat valid_mask;
     RigidTransform vehicle_from_camera;
+    ExposureTimes times = {};
   };
 
   /// Indexed as in the rig; cameras that are not in use are empty.
@@ -37,8 +40,9 @@ class MotionRefinement {
   ~MotionRefinement();
 
   /// Follows the points of each camera into its next image (CV_8UC1 of its size; empty: none). Stamps must
-  /// rise. `odom_from_vehicle` predicts the points.
-  void addFrame(Timestamp stamp, const std::vector<cv::Mat>& images, const RigidTransform& odom_from_vehicle);
+  /// rise. `odom_from_vehicle` predicts the points; `rates` tell from where a line saw them.
+  void addFrame(Timestamp stamp, const std::vector<cv::Mat>& images, const RigidTransform& odom_from_vehicle,
+                const VehicleRates& rates = {});
   /// Drops what was observed before this stamp.
   void forgetBefore(Timestamp stamp);
   void clear();
@@ -54,6 +58,10 @@ class MotionRefinement {
   /// Refines the motion of the vehicle between two added frames.
   Result refine(Timestamp neighbour, Timestamp reference,
                 const RigidTransform& neighbour_from_reference) const;
+  /// A neighbour of a camera's image, both added, with its pose relative to the reference and the noise of
+  /// that pose refined.
+  SweepImage refined(const SweepImage& neighbour, const SweepImage& reference,
+                     const RigidTransform& vehicle_from_camera) const;
 
  private:
   class FollowedCamera;

@@ -35,6 +35,7 @@ struct RangeMapper::Camera {
   size_t index;
   RigidTransform vehicle_from_camera;
   WorkingCamera working_camera;
+  ExposureTimes times;
   PlaneSweep plane_sweep;
   VehicleLight light;
   std::deque<Frame> frames;
@@ -79,7 +80,7 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
       ground = groundInCamera(*camera.vehicle_from_camera);
     }
     cameras_[index].reset(
-        new Camera{index, *camera.vehicle_from_camera, working,
+        new Camera{index, *camera.vehicle_from_camera, working, ExposureTimes::of(camera, working),
                    PlaneSweep(working.model(), working.validMask(), options_.plane_sweep, ground),
                    VehicleLight(working.model(), working.validMask(), *camera.vehicle_from_camera)});
     cameras_[index]->status.camera_name = camera.name;
@@ -98,8 +99,9 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
   }
   std::vector<std::optional<MotionRefinement::Camera>> followed(cameras_.size());
   for (const size_t index : used) {
-    const WorkingCamera& working = cameras_[index]->working_camera;
-    followed[index] = {working.model(), working.validMask(), cameras_[index]->vehicle_from_camera};
+    const Camera& camera = *cameras_[index];
+    followed[index] = {camera.working_camera.model(), camera.working_camera.validMask(),
+                       camera.vehicle_from_camera, camera.times};
   }
   motion_ = std::make_unique<MotionRefinement>(followed, options_.plane_sweep.pose_noise);
   assembler_ = std::make_unique<ImageFrameAssembler>(
@@ -154,10 +156,14 @@ void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
 
 void RangeMapper::process(const ImageFrame& frame) {
   std::vector<const WorkingCamera*> working(cameras_.size(), nullptr);
-  for (size_t i = 0; i < cameras_.size(); ++i) {
-    working[i] = cameras_[i] ? &cameras_[i]->working_camera : nullptr;
+  std::vector<Exposure> exposures(cameras_.size());
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      working[camera->index] = &camera->working_camera;
+      exposures[camera->index] = Exposure::of(camera->times, camera->vehicle_from_camera, frame.rates);
+    }
   }
-  WorkingImages images(frame, std::move(working), condition_, stereo_.get());
+  WorkingImages images(frame, std::move(working), std::move(exposures), condition_, stereo_.get());
   if (frame.odom_from_vehicle) {
     followPoints(frame, &images);
   }
@@ -185,7 +191,7 @@ void RangeMapper::followPoints(const ImageFrame& frame, WorkingImages* images) {
     }
   }
   motion_->forgetBefore(oldest);
-  motion_->addFrame(frame.stamp, followed, *frame.odom_from_vehicle);
+  motion_->addFrame(frame.stamp, followed, *frame.odom_from_vehicle, frame.rates);
 }
 
 void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections) {
@@ -205,10 +211,11 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, Work
     return;
   }
   const Timestamp stamp = frame.stamp;
-  const RigidTransform world_from_camera = *frame.odom_from_vehicle * camera->vehicle_from_camera;
+  SweepImage image{stamp,   {}, *frame.odom_from_vehicle * camera->vehicle_from_camera,
+                   nullptr, {}, images->exposureOf(camera->index)};
   if (!camera->frames.empty()) {
     const SweepImage& last = camera->frames.back().image;
-    const double motion_m = camera->motion_m(world_from_camera);
+    const double motion_m = camera->motion_m(image.world_from_camera);
     if (motion_m < kMinMotion_m) {
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
@@ -218,7 +225,8 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, Work
           standsAt(assembler_->odometry(), stamp) ? images->instant(camera->index) : nullptr;
       if (instant) {
         camera->status.message = "the camera does not move: ranges only where other cameras see the same";
-        emit(camera, {camera->index, {stamp, images->of(camera->index), world_from_camera}, {}, instant});
+        image.pixels = images->of(camera->index);
+        emit(camera, {camera->index, image, {}, instant});
       }
       return;
     }
@@ -230,8 +238,8 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, Work
       ++camera->status.resets;
     }
   }
-  const cv::Mat pixels = camera->light.removeFrom(images->of(camera->index), world_from_camera);
-  addFrame(camera, {stamp, pixels, world_from_camera}, images->instant(camera->index));
+  image.pixels = camera->light.removeFrom(images->of(camera->index), image.world_from_camera);
+  addFrame(camera, image, images->instant(camera->index));
 }
 
 void RangeMapper::addFrame(Camera* camera, const SweepImage& frame,
@@ -309,19 +317,7 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
 
 SweepImage RangeMapper::refined(const Camera& camera, const SweepImage& neighbour,
                                 const SweepImage& reference) {
-  const RigidTransform camera_from_vehicle = camera.vehicle_from_camera.inverse();
-  const RigidTransform neighbour_from_reference =
-      (neighbour.world_from_camera * camera_from_vehicle).inverse() *
-      (reference.world_from_camera * camera_from_vehicle);
-  const MotionRefinement::Result motion =
-      motion_->refine(neighbour.stamp, reference.stamp, neighbour_from_reference);
-  SweepImage result = neighbour;
-  if (motion.is_refined) {
-    result.world_from_camera = reference.world_from_camera * camera_from_vehicle *
-                               motion.neighbour_from_reference.inverse() * camera.vehicle_from_camera;
-    result.noise.rotation_left = motion.rotation_variance_left;
-    result.noise.translation_left = motion.translation_variance_left;
-  }
+  SweepImage result = motion_->refined(neighbour, reference, camera.vehicle_from_camera);
   addNoiseOfExtrinsics(condition_[camera.index],
                        result.world_from_camera.inverse() * reference.world_from_camera, &result.noise);
   return result;
@@ -367,7 +363,9 @@ RangeMap RangeMapper::sweep(const RangeTask& task) const {
   }
   map.camera_name = rig_->cameras[task.camera_index].name;
   map.frame_id = rig_->cameras[task.camera_index].frame_id;
-  map.reference = task.reference.pixels;
+  if (map.reference.empty()) {
+    map.reference = task.reference.pixels;
+  }
   return map;
 }
 

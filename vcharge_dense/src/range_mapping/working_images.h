@@ -19,9 +19,11 @@ class WorkingImages {
  public:
   /// Images of cameras that moved are not matched with those of others.
   WorkingImages(const ImageFrame& frame, std::vector<const WorkingCamera*> cameras,
-                const RigCondition& condition, const InterCameraStereo* stereo)
+                std::vector<Exposure> exposures, const RigCondition& condition,
+                const InterCameraStereo* stereo)
       : frame_(frame),
         cameras_(std::move(cameras)),
+        exposures_(std::move(exposures)),
         condition_(condition),
         stereo_(stereo),
         pixels_(cameras_.size()) {}
@@ -33,6 +35,8 @@ class WorkingImages {
     return pixels_[camera];
   }
 
+  const Exposure& exposureOf(size_t camera) const { return exposures_[camera]; }
+
   /// The images of all cameras if this one can be matched with some of them; otherwise null.
   std::shared_ptr<const InstantImages> instant(size_t camera) {
     if (stereo_ != nullptr && !instant_) {
@@ -41,7 +45,7 @@ class WorkingImages {
         pixels[i] =
             cameras_[i] != nullptr && !condition_[i].has_moved && frame_.has_image[i] ? of(i) : cv::Mat();
       }
-      instant_ = stereo_->instant(frame_.stamp, std::move(pixels));
+      instant_ = stereo_->instant(frame_.stamp, std::move(pixels), exposures_);
     }
     return instant_ && stereo_->canMeasure(*instant_, camera) ? instant_ : nullptr;
   }
@@ -49,6 +53,7 @@ class WorkingImages {
  private:
   const ImageFrame& frame_;
   const std::vector<const WorkingCamera*> cameras_;
+  const std::vector<Exposure> exposures_;
   const RigCondition& condition_;
   const InterCameraStereo* stereo_;
   std::vector<cv::Mat> pixels_;

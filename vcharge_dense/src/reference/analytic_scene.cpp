@@ -51,13 +51,18 @@ AnalyticScene::Hit AnalyticScene::intersect(const Eigen::Vector3d& origin,
 
 cv::Mat AnalyticScene::range(const MeiCamera& camera, cv::Size size,
                              const RigidTransform& world_from_camera) const {
+  return range(camera, size, [&](int) { return world_from_camera; });
+}
+
+cv::Mat AnalyticScene::range(const MeiCamera& camera, cv::Size size,
+                             const PoseOfRow& world_from_camera) const {
   cv::Mat range(size, CV_64FC1, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));
   for (int y = 0; y < size.height; ++y) {
+    const RigidTransform pose = world_from_camera(y);
     for (int x = 0; x < size.width; ++x) {
       Eigen::Vector3d ray;
       if (camera.unproject(Eigen::Vector2d(x, y), &ray)) {
-        range.at<double>(y, x) =
-            intersect(world_from_camera.translation(), world_from_camera.rotation() * ray).range_m;
+        range.at<double>(y, x) = intersect(pose.translation(), pose.rotation() * ray).range_m;
       }
     }
   }
@@ -66,18 +71,25 @@ cv::Mat AnalyticScene::range(const MeiCamera& camera, cv::Size size,
 
 cv::Mat AnalyticScene::render(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera,
                               double noise_gray_levels, uint32_t noise_seed) const {
+  return render(
+      camera, size, [&](int) { return world_from_camera; }, noise_gray_levels, noise_seed);
+}
+
+cv::Mat AnalyticScene::render(const MeiCamera& camera, cv::Size size, const PoseOfRow& world_from_camera,
+                              double noise_gray_levels, uint32_t noise_seed) const {
   std::mt19937 generator(noise_seed);
   const double pixel_rad = (1.0 + camera.xi()) / camera.gamma1();
   cv::Mat image(size, CV_8UC1, cv::Scalar(0));
   for (int y = 0; y < size.height; ++y) {
+    const RigidTransform pose = world_from_camera(y);
     for (int x = 0; x < size.width; ++x) {
       Eigen::Vector3d ray;
       double gray = 120.0;
       if (camera.unproject(Eigen::Vector2d(x, y), &ray)) {
-        const Eigen::Vector3d direction = world_from_camera.rotation() * ray;
-        const Hit hit = intersect(world_from_camera.translation(), direction);
+        const Eigen::Vector3d direction = pose.rotation() * ray;
+        const Hit hit = intersect(pose.translation(), direction);
         if (std::isfinite(hit.range_m) && hit.contrast > 0.0) {
-          const Eigen::Vector3d point = world_from_camera.translation() + hit.range_m * direction;
+          const Eigen::Vector3d point = pose.translation() + hit.range_m * direction;
           // Gaussian pixel footprint of half a pixel's width, longer on slanted surfaces.
           const double width_m = 0.5 * hit.range_m * pixel_rad / std::sqrt(std::max(0.05, hit.cos_incidence));
           for (const Wave& wave : waves_) {

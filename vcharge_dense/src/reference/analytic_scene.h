@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <random>
 #include <vector>
 
@@ -30,8 +31,13 @@ class AnalyticScene {
   /// Waves of the texture that are shorter than a pixel fade out.
   cv::Mat render(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera,
                  double noise_gray_levels = 0.0, uint32_t noise_seed = 1) const;
+  /// Pose of the camera when it exposed a row of the image.
+  using PoseOfRow = std::function<RigidTransform(int row)>;
+  cv::Mat render(const MeiCamera& camera, cv::Size size, const PoseOfRow& world_from_camera,
+                 double noise_gray_levels = 0.0, uint32_t noise_seed = 1) const;
   /// Distance along each pixel's ray (CV_64FC1), NaN if it meets no surface.
   cv::Mat range(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera) const;
+  cv::Mat range(const MeiCamera& camera, cv::Size size, const PoseOfRow& world_from_camera) const;
 
  private:
   struct Wave {

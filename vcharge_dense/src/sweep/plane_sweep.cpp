@@ -5,6 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "exposure/range_rectification.h"
 #include "kernels/half_resolution.h"
 #include "refinement/range_uncertainty.h"
 #include "sweep/coarse_pass.h"
@@ -39,7 +40,8 @@ void addNeighbours(const SweepLevel& level, const SweepImage& reference,
         SweepNeighbour{PackedImage(image.pixels, other != nullptr ? other->valid_mask : level.validMask()),
                        other != nullptr ? other->model : level.camera(), pose.rotationMatrix().cast<float>(),
                        pose.translation().cast<float>(), image.stamp > reference.stamp, image.noise,
-                       other != nullptr ? other->valid_mask : cv::Mat()});
+                       other != nullptr ? other->valid_mask : cv::Mat(), image.exposure, reference.exposure,
+                       level.camera().xi()});
   });
   for (std::optional<SweepNeighbour>& neighbour : prepared) {
     input->neighbours.push_back(std::move(*neighbour));
@@ -120,12 +122,13 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
   if (remembered != nullptr && coarse_ && options().num_refinement_steps > 0 &&
       options().min_confidence > 0.0) {
     memory.emplace(*level_, remembered->range_m,
-                   reference.world_from_camera.inverse() * remembered->world_from_camera,
+                   reference.world_from_camera.inverse() * remembered->world_from_camera, reference.exposure,
                    remembered->num_sweeps);
   }
   RangeMap map = sweep(input, pixels, details, memory ? &*memory : nullptr);
   map.stamp = reference.stamp;
-  return map;
+  map.reference = reference.pixels;
+  return reference.exposure.moves() ? rectified(map, level_->rays(), reference.exposure) : map;
 }
 
 RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details,

@@ -39,20 +39,18 @@ bool isKnown(float value) {
 
 /// A row of an earlier range map as the reference sees it.
 struct MovedRow {
+  std::vector<float> x, y, z;  // points in the reference's frame
   std::vector<float> u, v;
   std::vector<float> inverse_range;  // not positive where a range is unknown or the point invisible
 
-  explicit MovedRow(size_t columns) : u(columns), v(columns), inverse_range(columns) {}
+  explicit MovedRow(size_t columns)
+      : x(columns), y(columns), z(columns), u(columns), v(columns), inverse_range(columns) {}
 };
 
 VCHARGE_WIDE_LOOPS void moveRow(const SweepLevel& level, const cv::Mat& range_m, int y,
                                 const RigidTransform& reference_from_earlier, MovedRow* row) {
   const Eigen::Matrix3f r = reference_from_earlier.rotationMatrix().cast<float>();
   const Eigen::Vector3f t = reference_from_earlier.translation().cast<float>();
-  const MeiCamera& camera = level.camera();
-  const auto xi = static_cast<float>(camera.xi());
-  const auto fx = static_cast<float>(camera.gamma1()), fy = static_cast<float>(camera.gamma2());
-  const auto cx = static_cast<float>(camera.u0()), cy = static_cast<float>(camera.v0());
   const float r00 = r(0, 0), r01 = r(0, 1), r02 = r(0, 2), r10 = r(1, 0), r11 = r(1, 1), r12 = r(1, 2);
   const float r20 = r(2, 0), r21 = r(2, 1), r22 = r(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
   const size_t columns = row->u.size(), first = static_cast<size_t>(y) * columns;
@@ -60,17 +58,44 @@ VCHARGE_WIDE_LOOPS void moveRow(const SweepLevel& level, const cv::Mat& range_m,
   const float* ray_x = level.rays().x().data() + first;
   const float* ray_y = level.rays().y().data() + first;
   const float* ray_z = level.rays().z().data() + first;
+  float* x = row->x.data();
+  float* y_down = row->y.data();
+  float* z = row->z.data();
+  for (size_t i = 0; i < columns; ++i) {
+    x[i] = range[i] * (r00 * ray_x[i] + r01 * ray_y[i] + r02 * ray_z[i]) + tx;
+    y_down[i] = range[i] * (r10 * ray_x[i] + r11 * ray_y[i] + r12 * ray_z[i]) + ty;
+    z[i] = range[i] * (r20 * ray_x[i] + r21 * ray_y[i] + r22 * ray_z[i]) + tz;
+  }
+}
+
+VCHARGE_WIDE_LOOPS void projectRow(const MeiCamera& camera, MovedRow* row) {
+  const auto xi = static_cast<float>(camera.xi());
+  const auto fx = static_cast<float>(camera.gamma1()), fy = static_cast<float>(camera.gamma2());
+  const auto cx = static_cast<float>(camera.u0()), cy = static_cast<float>(camera.v0());
+  const float* x = row->x.data();
+  const float* y = row->y.data();
+  const float* z = row->z.data();
   float* u = row->u.data();
   float* v = row->v.data();
   float* inverse_range = row->inverse_range.data();
-  for (size_t i = 0; i < columns; ++i) {
-    const float x = range[i] * (r00 * ray_x[i] + r01 * ray_y[i] + r02 * ray_z[i]) + tx;
-    const float y_down = range[i] * (r10 * ray_x[i] + r11 * ray_y[i] + r12 * ray_z[i]) + ty;
-    const float z = range[i] * (r20 * ray_x[i] + r21 * ray_y[i] + r22 * ray_z[i]) + tz;
-    const float distance = std::sqrt(x * x + y_down * y_down + z * z), denominator = z + xi * distance;
-    u[i] = fx * x / denominator + cx;
-    v[i] = fy * y_down / denominator + cy;
+  for (size_t i = 0; i < row->x.size(); ++i) {
+    const float distance = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+    const float denominator = z[i] + xi * distance;
+    u[i] = fx * x[i] / denominator + cx;
+    v[i] = fy * y[i] / denominator + cy;
     inverse_range[i] = denominator > 0.1F * distance ? 1.0F / distance : 0.0F;
+  }
+}
+
+/// Moves points to where the reference sees them from when it exposes the lines that they are projected to.
+void exposeRow(const MeiCamera& camera, const Exposure& exposure, MovedRow* row) {
+  for (size_t i = 0; i < row->x.size(); ++i) {
+    const double time_s = exposure.times.at(
+        {(row->u[i] - camera.u0()) / camera.gamma1(), (row->v[i] - camera.v0()) / camera.gamma2()});
+    const Eigen::Vector3d seen = exposure.pointAfter(time_s, {row->x[i], row->y[i], row->z[i]});
+    row->x[i] = static_cast<float>(seen.x());
+    row->y[i] = static_cast<float>(seen.y());
+    row->z[i] = static_cast<float>(seen.z());
   }
 }
 
@@ -91,13 +116,19 @@ struct CoarseRow {
 }  // namespace
 
 SurfaceMemory::SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m,
-                             const RigidTransform& reference_from_earlier, uint32_t phase)
+                             const RigidTransform& reference_from_earlier, const Exposure& exposure,
+                             uint32_t phase)
     : phase_(phase), inverse_range_(pooledMat(range_m.size(), CV_32FC1)) {
   inverse_range_.setTo(kNaN);
   const cv::Rect image(cv::Point(), range_m.size());
   MovedRow row(static_cast<size_t>(range_m.cols));
   for (int y = 0; y < range_m.rows; ++y) {
     moveRow(level, range_m, y, reference_from_earlier, &row);
+    projectRow(level.camera(), &row);
+    if (exposure.moves()) {
+      exposeRow(level.camera(), exposure, &row);
+      projectRow(level.camera(), &row);
+    }
     for (size_t i = 0; i < row.u.size(); ++i) {
       if (row.inverse_range[i] > 0.0F) {
         const cv::Point pixel(cvRound(row.u[i]), cvRound(row.v[i]));

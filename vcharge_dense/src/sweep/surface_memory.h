@@ -7,6 +7,7 @@
 
 #include "sweep/sweep_level.h"
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_dense/exposure.h"
 
 namespace vcharge {
 
@@ -14,10 +15,11 @@ namespace vcharge {
 /// There the planes need not be swept: refineSurface() searches around the prediction.
 class SurfaceMemory {
  public:
-  /// `range_m`: the earlier range map (CV_32FC1), NaN where unknown. `phase` counts the sweeps: it selects
-  /// the tiles that are swept in full, so that what a prediction hides is found.
+  /// `range_m`: the earlier range map (CV_32FC1), NaN where unknown. `exposure`: of the reference. `phase`
+  /// counts the sweeps: it selects the tiles that are swept in full, so that what a prediction hides is
+  /// found.
   SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m, const RigidTransform& reference_from_earlier,
-                uint32_t phase);
+                const Exposure& exposure, uint32_t phase);
 
   /// Whether it predicts enough that CoarsePass need not find the surface by itself.
   bool predictsMuch() const { return predicts_much_; }

@@ -18,6 +18,17 @@ namespace {
 // little outside their nodes.
 constexpr float kInset_px = 4.0f;
 
+LineMotion lineMotion(const Exposure& exposure, const Eigen::Matrix3f& axes) {
+  const Eigen::Vector3f velocity = axes * exposure.velocity_m_per_s.cast<float>();
+  const Eigen::Vector3f turn_rate = axes * exposure.turn_rate_rad_per_s.cast<float>();
+  LineMotion motion;
+  motion.lines_are_columns = exposure.times.lines_are_columns;
+  Eigen::Map<Eigen::Vector4f>(motion.times_s) = exposure.times.coefficients_s.cast<float>();
+  Eigen::Map<Eigen::Vector3f>(motion.velocity) = velocity;
+  Eigen::Map<Eigen::Vector3f>(motion.turn_rate) = turn_rate;
+  return motion;
+}
+
 /// Computes the reference's mean and inverse deviation in the rows `begin` to `end`.
 VCHARGE_WIDE_LOOPS void findMoments(int begin, int end, int window, double min_squares,
                                     SweepReference* reference) {
@@ -93,6 +104,10 @@ Projection SweepNeighbour::projection() const {
     }
     p.translation[i] = translation_m[i];
   }
+  p.is_moving = exposure.moves() || reference_exposure.moves();
+  p.reference_xi = static_cast<float>(reference_xi);
+  p.reference = lineMotion(reference_exposure, neighbour_from_reference);
+  p.neighbour = lineMotion(exposure, Eigen::Matrix3f::Identity());
   return p;
 }
 

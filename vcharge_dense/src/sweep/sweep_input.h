@@ -9,6 +9,7 @@
 #include "kernels/sweep_kernels.h"
 #include "vcharge_core/camera/mei_camera.h"
 #include "vcharge_core/camera/ray_table.h"
+#include "vcharge_dense/exposure.h"
 #include "vcharge_dense/plane_sweep_options.h"
 
 namespace vcharge {
@@ -21,6 +22,9 @@ struct SweepNeighbour {
   bool after = false;                        ///< taken after the reference
   NeighbourNoise noise;
   cv::Mat other_mask;  ///< valid pixels of another camera than the reference's; otherwise empty
+  Exposure exposure;
+  Exposure reference_exposure;
+  double reference_xi = 0.0;  ///< of the reference's camera
 
   Projection projection() const;
 };

@@ -10,6 +10,7 @@ STAGES = {
     "pose_graphs": "pose_graphs",
     "localization": "localization",
     "living_map": "living_map",
+    "shutters": "shutters",
     "ranges": "ranges",
     "height_map": "height_map",
     "obstacles": "obstacles",

@@ -9,6 +9,7 @@ import yaml
 
 from vcharge_evaluation import spoiled_drives
 from vcharge_evaluation.chain.figures import judge_rig as judge_and_draw_rig
+from vcharge_evaluation.drives import shutter_words
 from vcharge_evaluation.live import rig_calibration as live_rig_calibration
 from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
@@ -205,8 +206,7 @@ def evaluate_shutters(args, results):
         least = Calibration(sound, sound / "rig_truth.yaml")
         for readout_ms in READOUTS_MS:
             folder = args.work / f"{drive.folder.name}_readout{readout_ms}"
-            simulate(folder, [*drive.words, *USUAL_WHEELS, "--set", "faults.rolling_shutter.cameras=[all]", "--set",
-                              f"faults.rolling_shutter.readout_time_s={readout_ms / 1000}"])
+            simulate(folder, [*drive.words, *USUAL_WHEELS, *shutter_words(readout_ms)])
             truth = folder / "rig_truth.yaml"
             told, wrong = (spoiled_drives.write_timed_rig(truth, folder / f"{name}.yaml", readout_ms / 1000, direction)
                            for name, direction in (("told", "down"), ("wrong", "up")))

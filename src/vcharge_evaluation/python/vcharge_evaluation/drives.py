@@ -58,6 +58,12 @@ def scenario_drive(work, name, seed, scale, duration_s, words=()):
                  scale, "--duration-s", duration_s, "--truth-range", *words)
 
 
+def shutter_words(readout_ms):
+    """Words that give all cameras of a drive a rolling shutter from top to bottom; none for 0."""
+    return ("--set", "faults.rolling_shutter.cameras=[all]", "--set",
+            f"faults.rolling_shutter.readout_time_s={readout_ms / 1000}") if readout_ms else ()
+
+
 def condition_words(condition):
     """Words that put a drive into a light and weather of CONDITIONS; none at noon."""
     return () if condition == "noon" else ("--set", f"condition.kind={condition}")
