@@ -219,7 +219,7 @@ class FaultsTest(unittest.TestCase):
             self.assertIn(received - stamp, (0, 170))
 
     def test_image_stamp_shift(self):
-        recording, _ = self.fault("image_stamp_shift", "cameras=[left]", "start_s=0.3", "shift_s=0.02")
+        recording, _ = self.fault("image_stamp_shift", "cameras=[left]", "start_s=0.3", "shifts_s=[0.02]")
         self.assert_same(recording, cameras=("front", "rear", "right"))
         for (stamp, received, pixels), (true_stamp, _, base_pixels) in zip(recording.images["left"],
                                                                            self.base.images["left"]):

@@ -88,11 +88,14 @@ void checkImagesCanBeReused(const DriveScenario& scenario, const std::string& im
 // Whether a fault changes what is rendered for a camera at that time, or at any time.
 bool changesRendering(const FaultOptions& faults, const std::string& camera, Duration since_start) {
   return faults.bumped_camera.actsOn(camera, since_start) ||
-         faults.rolling_shutter.actsOn(camera, since_start) || faults.motion_blur.actsOn(camera, since_start);
+         faults.rolling_shutter.actsOn(camera, since_start) ||
+         faults.motion_blur.actsOn(camera, since_start) ||
+         faults.image_stamp_shift.exposureShiftOf(camera, since_start) != 0.0;
 }
 bool changesRendering(const FaultOptions& faults) {
   return faults.bumped_camera.isActive() || faults.rolling_shutter.isActive() ||
-         faults.motion_blur.isActive();
+         faults.motion_blur.isActive() ||
+         (faults.image_stamp_shift.isActive() && faults.image_stamp_shift.moves_exposure);
 }
 
 // `to` is a point or, if w is 0, a direction.

@@ -35,10 +35,11 @@ class RenderedImages : public ImageSource {
     const Duration since_start = drive_.world_from_vehicle[frame].stamp - drive_.ground_truth.front().stamp;
     const CameraView& view = cameras_.view(camera, since_start);
     Readout readout = cameras_.readout(camera, since_start, drive_.image_motion[frame]);
+    const double middle_s = readout.middle_s;
     const int renderings = blur_.actsOn(cameras_.name(camera), since_start) ? blur_.renderings : 1;
     cv::Mat light;
     for (int i = 0; i < renderings; ++i) {
-      readout.middle_s = ((i + 0.5) / renderings - 0.5) * blur_.exposure_time_s;
+      readout.middle_s = middle_s + ((i + 0.5) / renderings - 0.5) * blur_.exposure_time_s;
       const cv::Mat rendered = renderer_.renderLight(view, readout, scene_times_s_[frame]);
       light = i == 0 ? rendered : light + rendered;
     }
@@ -48,7 +49,7 @@ class RenderedImages : public ImageSource {
     if (glare_ == nullptr) {
       return response_.develop(light);
     }
-    readout.middle_s = 0.0;
+    readout.middle_s = middle_s;
     glare_->apply(view, readout, &light);
     return light;
   }

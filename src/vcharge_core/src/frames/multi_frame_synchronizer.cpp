@@ -10,6 +10,8 @@ namespace {
 
 /// A larger step back of stamps is a replay.
 constexpr double kReplay_s = 1.0;
+/// Incomplete sets that are kept.
+constexpr size_t kMaxPendingSets = 8;
 
 }  // namespace
 
@@ -102,7 +104,7 @@ std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_inde
     ++counts_.complete_sets;
     return complete;
   }
-  if (pending_.size() > static_cast<size_t>(options_.max_pending_sets)) {
+  if (pending_.size() > kMaxPendingSets) {
     giveUpOldest();
   }
   return nullptr;

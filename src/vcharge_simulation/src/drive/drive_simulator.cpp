@@ -22,11 +22,16 @@ Timestamp stampAt(int milliseconds) {
   return Timestamp::fromNanoseconds(kStart_ns + static_cast<int64_t>(milliseconds) * 1'000'000);
 }
 
-// Time before and after its stamp in which an image is exposed and read out.
+// Time before and after the common trigger in which images are exposed and read out.
 int reachOfImage_ms(const FaultOptions& faults) {
   const double blur_s = faults.motion_blur.isActive() ? faults.motion_blur.exposure_time_s : 0.0;
   const double readout_s = faults.rolling_shutter.isActive() ? faults.rolling_shutter.readout_time_s : 0.0;
-  return static_cast<int>(std::ceil(500.0 * (blur_s + readout_s)));
+  double shift_s = 0.0;
+  for (const double shift_of_camera_s : faults.image_stamp_shift.shifts_s) {
+    const bool counts = faults.image_stamp_shift.isActive() && faults.image_stamp_shift.moves_exposure;
+    shift_s = counts ? std::max(shift_s, std::abs(shift_of_camera_s)) : shift_s;
+  }
+  return static_cast<int>(std::ceil(500.0 * (blur_s + readout_s) + 1000.0 * shift_s));
 }
 
 MotionWindow windowOf(const VehicleMotion& motion, int middle_ms, int reach_ms) {

@@ -1,8 +1,28 @@
 #include "vcharge_simulation/faults/fault_options.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace vcharge {
+namespace {
+
+void checkOnePerCamera(const CameraFault& fault, const char* name, const std::vector<double>& values) {
+  requireField(values.size() == 1 || values.size() == fault.cameras.size(), name,
+               "must have one number, or one per camera", static_cast<double>(values.size()));
+}
+
+/// A camera's value, where there is one for each of the fault's cameras or one for all.
+double valueOf(const CameraFault& fault, const std::vector<double>& values, const std::string& camera,
+               double otherwise) {
+  for (size_t i = 0; i < fault.cameras.size(); ++i) {
+    if (fault.cameras[i] == camera || fault.cameras[i] == "all") {
+      return values[values.size() == 1 ? 0 : i];
+    }
+  }
+  return otherwise;
+}
+
+}  // namespace
 
 bool FaultInterval::actsAt(Duration since_start) const {
   return (start_s == 0.0 || since_start >= durationFromSeconds(start_s)) &&
@@ -28,17 +48,24 @@ void BrightLampsFault::checkFields() const {
 
 void CameraGainsFault::checkFields() const {
   CameraFault::checkFields();
-  requireField(gains.size() == 1 || gains.size() == cameras.size(), "gains",
-               "must have one number, or one per camera", static_cast<double>(gains.size()));
+  checkOnePerCamera(*this, "gains", gains);
 }
 
 double CameraGainsFault::gainOf(const std::string& camera) const {
-  for (size_t i = 0; i < cameras.size(); ++i) {
-    if (cameras[i] == camera || cameras[i] == "all") {
-      return gains[gains.size() == 1 ? 0 : i];
-    }
+  return valueOf(*this, gains, camera, 1.0);
+}
+
+void ImageStampShiftFault::checkFields() const {
+  CameraFault::checkFields();
+  checkOnePerCamera(*this, "shifts_s", shifts_s);
+  for (const double shift_s : shifts_s) {
+    requireField(!moves_exposure || std::abs(shift_s) <= kMaxExposureShift_s, "shifts_s",
+                 "must be within 0.1 s where moves_exposure is set", shift_s);
   }
-  return 1.0;
+}
+
+double ImageStampShiftFault::shiftOf(const std::string& camera, Duration since_start) const {
+  return actsAt(since_start) ? valueOf(*this, shifts_s, camera, 0.0) : 0.0;
 }
 
 Duration OdometryStampShiftFault::shiftAt(Duration since_start) const {

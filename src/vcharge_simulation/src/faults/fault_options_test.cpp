@@ -68,6 +68,16 @@ TEST(FaultOptionsTest, GainsFollowTheOrderOfTheCameras) {
   EXPECT_EQ(read("camera_gains: {cameras: [all], gains: [3]}").camera_gains.gainOf("rear"), 3.0);
 }
 
+TEST(FaultOptionsTest, ShiftsOfStampsFollowTheOrderOfTheCameras) {
+  const ImageStampShiftFault shifts =
+      read("image_stamp_shift: {cameras: [left, front], shifts_s: [0.01, -0.02], start_s: 1}")
+          .image_stamp_shift;
+  EXPECT_EQ(shifts.shiftOf("front", std::chrono::seconds(2)), -0.02);
+  EXPECT_EQ(shifts.shiftOf("front", std::chrono::seconds(0)), 0.0);
+  EXPECT_EQ(shifts.shiftOf("rear", std::chrono::seconds(2)), 0.0);
+  EXPECT_EQ(shifts.exposureShiftOf("front", std::chrono::seconds(2)), 0.0);
+}
+
 TEST(FaultOptionsTest, BadValuesAreNamed) {
   expectRejected("dead_camera: {cameras: [left], start_s: 2, end_s: 1}", "dead_camera.end_s");
   expectRejected("dead_camera: {camera: left}", "dead_camera.camera");
@@ -83,6 +93,9 @@ TEST(FaultOptionsTest, BadValuesAreNamed) {
   expectRejected("auto_exposure: {target_gray: 0}", "auto_exposure.target_gray");
   expectRejected("camera_gains: {cameras: [left, front, rear], gains: [1, 2]}", "camera_gains.gains");
   expectRejected("camera_gains: {cameras: [left], gains: [0]}", "camera_gains.gains");
+  expectRejected("image_stamp_shift: {cameras: [left], shifts_s: [1, 2]}", "image_stamp_shift.shifts_s");
+  expectRejected("image_stamp_shift: {cameras: [left], shifts_s: [0.2], moves_exposure: true}",
+                 "image_stamp_shift.shifts_s");
   expectRejected("vignetting: {rim_loss: 1}", "vignetting.rim_loss");
   expectRejected("water_drop: {radius: 0}", "water_drop.radius");
   expectRejected("low_light: {level: 0}", "low_light.level");

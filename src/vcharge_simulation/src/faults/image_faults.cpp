@@ -1,5 +1,7 @@
 #include "vcharge_simulation/faults/image_faults.h"
 
+#include <algorithm>
+
 #include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
@@ -49,8 +51,9 @@ std::optional<DeliveredImage> ImageFaults::deliver(size_t camera, size_t frame, 
     hits_.late[camera].push_back(stamp);
     delivered.received = stamp + durationFromSeconds(faults_.late_images.delay_s);
   }
-  if (faults_.image_stamp_shift.actsOn(name, since_start)) {
-    delivered.stamp = stamp + durationFromSeconds(faults_.image_stamp_shift.shift_s);
+  delivered.stamp = stamp + durationFromSeconds(faults_.image_stamp_shift.shiftOf(name, since_start));
+  if (faults_.image_stamp_shift.moves_exposure) {
+    delivered.received = std::max(delivered.received, delivered.stamp);
   }
   return delivered;
 }

@@ -124,12 +124,20 @@ TEST(ImageFaultsTest, LateImagesArriveLateWithTheRightStamp) {
 }
 
 TEST(ImageFaultsTest, ShiftedStampsLeaveTheArrivalAsItIs) {
-  ImageFaults faults = make(read("image_stamp_shift: {cameras: [left], start_s: 0.2, shift_s: -0.03}"));
+  ImageFaults faults = make(read("image_stamp_shift: {cameras: [left], start_s: 0.2, shifts_s: [-0.03]}"));
   for (size_t frame = 0; frame < 6; ++frame) {
     const std::optional<DeliveredImage> image = faults.deliver(kLeft, frame, stampOf(frame), imageOf(frame));
     EXPECT_EQ(image->stamp - stampOf(frame), std::chrono::milliseconds(frame < 3 ? 0 : -30));
     EXPECT_EQ(image->received, stampOf(frame));
   }
+}
+
+TEST(ImageFaultsTest, ImagesOfCamerasWithoutATriggerArriveAfterTheirExposure) {
+  ImageFaults faults = make(
+      read("image_stamp_shift: {cameras: [left, front], shifts_s: [0.03, -0.01], moves_exposure: true}"));
+  const std::optional<DeliveredImage> image = faults.deliver(kLeft, 0, stampOf(0), imageOf(0));
+  EXPECT_EQ(image->stamp - stampOf(0), std::chrono::milliseconds(30));
+  EXPECT_EQ(image->received, image->stamp);
 }
 
 }  // namespace

@@ -194,10 +194,13 @@ TEST(OdometryFaultsTest, MotionOfAnImageCoversItsExposureAndReadout) {
   faults.motion_blur.exposure_time_s = 0.04;
   faults.rolling_shutter.cameras = {"left"};
   faults.rolling_shutter.readout_time_s = 0.0205;
+  faults.image_stamp_shift.cameras = {"left"};
+  faults.image_stamp_shift.shifts_s = {-0.01};
+  faults.image_stamp_shift.moves_exposure = true;
   const SimulatedDrive drive = simulate(faults);
   expectSameTruth(simulate({}), drive);
   ASSERT_EQ(drive.image_motion.size(), drive.world_from_vehicle.size());
-  constexpr double kReach_s = 0.03025;
+  constexpr double kReach_s = 0.04025;
   for (size_t i = 0; i < drive.image_motion.size(); ++i) {
     const MotionWindow& motion = drive.image_motion[i];
     EXPECT_EQ(motion.at(0.0).matrix(), drive.world_from_vehicle[i].world_from_vehicle.matrix());

@@ -83,7 +83,9 @@ const CameraView& RecordedCameras::view(size_t camera, Duration since_start) con
 
 Readout RecordedCameras::readout(size_t camera, Duration since_start, const MotionWindow& motion) const {
   const RollingShutterFault& rolling = faults_.rolling_shutter;
-  return {motion, rolling.actsOn(name(camera), since_start) ? rolling.readout_time_s : 0.0};
+  Readout readout(motion, rolling.actsOn(name(camera), since_start) ? rolling.readout_time_s : 0.0);
+  readout.middle_s = faults_.image_stamp_shift.exposureShiftOf(name(camera), since_start);
+  return readout;
 }
 
 size_t RecordedCameras::partner(size_t camera) const {

@@ -14,7 +14,6 @@ namespace vcharge {
 struct MultiFrameSynchronizerOptions {
   VCHARGE_BEGIN_OPTIONS(MultiFrameSynchronizerOptions);
   VCHARGE_OPTION(double, tolerance_s, 0.0, between(0.0, 3600.0), "Difference of stamps of one instant.");
-  VCHARGE_OPTION(int, max_pending_sets, 8, atLeast(1), "Incomplete sets that are kept.");
   VCHARGE_OPTION(bool, keep_incomplete, false, anyValue(), "Whether takeIncomplete() returns sets.");
   VCHARGE_END_OPTIONS();
 };

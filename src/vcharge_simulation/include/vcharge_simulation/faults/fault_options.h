@@ -132,9 +132,19 @@ struct LateImagesFault : DroppedImagesFault {
 
 struct ImageStampShiftFault : CameraFault {
   VCHARGE_BEGIN_DERIVED_OPTIONS(ImageStampShiftFault, CameraFault);
-  VCHARGE_OPTION(double, shift_s, 0.02, between(-10.0, 10.0),
-                 "Stamp minus true time; the arrival is unchanged.");
+  VCHARGE_OPTION(std::vector<double>, shifts_s, std::vector<double>(1, 0.02), between(-10.0, 10.0),
+                 "Stamp minus true time of each of the cameras, in their order, or one for all.");
+  VCHARGE_OPTION(bool, moves_exposure, false, anyValue(),
+                 "The shifted stamps are right: cameras have no common trigger.");
   VCHARGE_END_OPTIONS();
+
+  static constexpr double kMaxExposureShift_s = 0.1;
+  void checkFields() const;
+  double shiftOf(const std::string& camera, Duration since_start) const;  ///< 0 for other cameras
+  /// Exposure after the common trigger.
+  double exposureShiftOf(const std::string& camera, Duration since_start) const {
+    return moves_exposure ? shiftOf(camera, since_start) : 0.0;
+  }
 };
 
 struct ExposureStepFault : CameraFault {

@@ -15,7 +15,7 @@ struct Readout {
 
   MotionWindow motion;          ///< covers the readout
   double readout_time_s = 0.0;  ///< time per row times number of rows; 0: global shutter
-  double middle_s = 0.0;        ///< exposure of the middle row, after the stamp
+  double middle_s = 0.0;        ///< exposure of the middle row, after the middle of the window
 
   /// Time after the stamp at a fraction of the image height, 0 at the upper border.
   double timeAt(double fraction) const { return middle_s + readout_time_s * (fraction - 0.5); }

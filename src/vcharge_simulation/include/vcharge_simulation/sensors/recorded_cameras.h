@@ -25,7 +25,7 @@ class RecordedCameras {
 
   /// The camera with its extrinsics at that time.
   const CameraView& view(size_t camera, Duration since_start) const;
-  /// Readout of an image whose exposure of the middle row has this window of the vehicle's motion.
+  /// Readout of an image with this window of the vehicle's motion around the common trigger.
   Readout readout(size_t camera, Duration since_start, const MotionWindow& motion) const;
   /// Index of the camera under whose name the images of this one are recorded.
   size_t plug(size_t camera, Duration since_start) const;
