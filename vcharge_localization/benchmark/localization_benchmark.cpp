@@ -174,7 +174,7 @@ void features(benchmark::State& state) {
   cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
   const std::vector<Image> images(largeRig()->cameras.size(), Image{image, nullptr});
   for (auto _ : state) {
-    benchmark::DoNotOptimize(localizer().extract(images, VehicleRates()).images.data());
+    benchmark::DoNotOptimize(localizer().extract(images, FrameMotion()).images.data());
   }
 }
 BENCHMARK(features)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();

@@ -48,6 +48,7 @@ class LocalizationNodelet : public Nodelet {
     assembler_ = std::make_unique<ImageFrameAssembler>(
         rig_->cameras.size(), options_.frames,
         [this](ImageFrame frame) { queue_->push(0, std::move(frame)); });
+    assembler_->joinStamps(rig_->stamp_tolerance_s);
     addDiagnostics(
         "/pose", [this] { return report_.report(queue_->numDropped(0), assembler_->counters()); },
         Threads::kOne);

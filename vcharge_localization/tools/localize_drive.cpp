@@ -79,6 +79,7 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
       hasher.addBytes(matrix.data(), sizeof(double) * 12);
     }
   });
+  assembler.joinStamps(rig->stamp_tolerance_s);
   BagDriveSourceOptions source_options;
   source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, but is no error
   BagDriveSource source(arguments.bag, rig, source_options);

@@ -64,6 +64,7 @@ MapRigCalibrator::MapRigCalibrator(std::shared_ptr<const SparseMap> map, const C
   assembler_ =
       std::make_unique<FrameAssembler<Image>>(rig_->cameras.size(), options_.assemblerOptions(),
                                               [this](const ImageFrame& frame) { processFrame(frame); });
+  assembler_->joinStamps(rig_->stamp_tolerance_s);
   state_.report.counters = assembler_->counters();
 }
 
@@ -90,8 +91,8 @@ void MapRigCalibrator::processFrame(const ImageFrame& frame) {
   const RigidTransform since = motionSinceKeyframe(odom_from_vehicle);
   if (keyframes_.isDue(since)) {
     images_.add(static_cast<int32_t>(views_.size()), frame.images);
-    addKeyframe(frame.stamp, localizer_->extract(frame.images, VehicleRates()), odom_from_vehicle,
-                frame.rates);
+    addKeyframe(frame.stamp, localizer_->extract(frame.images, FrameMotion()), odom_from_vehicle,
+                frame.motion);
   } else {
     keyframes_.addFrame(frame.stamp, since, MotionHypothesis::kOdometry);
   }
@@ -103,7 +104,7 @@ RigidTransform MapRigCalibrator::motionSinceKeyframe(const RigidTransform& odom_
 }
 
 void MapRigCalibrator::addKeyframe(Timestamp stamp, RigFeatures features,
-                                   const RigidTransform& odom_from_vehicle, const VehicleRates& rates) {
+                                   const RigidTransform& odom_from_vehicle, const FrameMotion& motion) {
   MapKeyframeView view;
   view.features = std::move(features);
   view.camera_fixes.resize(rig_->cameras.size());
@@ -114,7 +115,7 @@ void MapRigCalibrator::addKeyframe(Timestamp stamp, RigFeatures features,
   Keyframe keyframe;
   keyframe.stamp = stamp;
   keyframe.odom_from_vehicle = odom_from_vehicle;
-  keyframe.rates = rates;
+  keyframe.motion = motion;
   keyframe.travelled_m = travelled_m_;
   keyframes_.addKeyframe(std::move(keyframe), since, MotionHypothesis::kOdometry);
   views_.push_back(std::move(view));

@@ -114,6 +114,7 @@ BodyMaskEstimator::BodyMaskEstimator(std::shared_ptr<const CameraRig> rig, const
   if (rig_->cameras.empty()) {
     throw InputError("rig: expected a camera");
   }
+  assembler_.joinStamps(rig_->stamp_tolerance_s);
 }
 
 void BodyMaskEstimator::addImage(size_t camera_index, Timestamp stamp, const Image& image) {

@@ -165,7 +165,7 @@ class NeighbourSearch {
     }
     std::vector<int32_t> tracks;
     std::vector<cv::Point2f> seen_px, expected_px;
-    const MovingCamera second = cameraAt(data_.keyframes[k], data_.rig->cameras[second_]);
+    const MovingCamera second = cameraAt(data_.keyframes[k], *data_.rig, second_);
     for (const LandmarkPixel& observation : earlier.common) {
       Eigen::Vector3d ray;
       if (!data_.rig->cameras[first_].model.unproject(observation.position_px, &ray)) {

@@ -118,7 +118,7 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& optio
     half.keyframes.emplace_back();
     half.keyframes.back().odom_from_vehicle = keyframe.odom_from_vehicle;
     half.keyframes.back().map_from_vehicle = keyframe.map_from_vehicle;
-    half.keyframes.back().rates = keyframe.rates;
+    half.keyframes.back().motion = keyframe.motion;
     half.keyframes.back().travelled_m = keyframe.travelled_m;
   }
   RigPriors half_priors;

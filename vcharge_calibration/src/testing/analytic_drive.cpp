@@ -41,7 +41,7 @@ ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px, double lean
     keyframe.images.resize(rig->cameras.size());
     const double turn_rad = side * 0.5 / 6.0;
     const double speed_m_per_s = 2.5 + 1.5 * std::sin(0.4 * i);
-    keyframe.rates = {speed_m_per_s, turn_rad / 0.5 * speed_m_per_s};
+    keyframe.motion.rates = {speed_m_per_s, turn_rad / 0.5 * speed_m_per_s};
     data.keyframes.push_back(keyframe);
     map_from_vehicle = map_from_vehicle * RigidTransform::planar(0.5 * std::cos(0.5 * turn_rad),
                                                                  0.5 * std::sin(0.5 * turn_rad), turn_rad);
@@ -65,7 +65,7 @@ ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px, double lean
       for (int32_t c = 0; c < 2; ++c) {
         const RigCamera& camera = rig->cameras[c];
         const Eigen::Vector3d in_camera =
-            cameraAt(data.keyframes[k], camera).pointInCamera(*track.position_m);
+            cameraAt(data.keyframes[k], *data.rig, c).pointInCamera(*track.position_m);
         Eigen::Vector2d pixel;
         if (in_camera.norm() < 10.0 && in_camera.norm() > 0.5 && in_camera.z() > 0.1 * in_camera.norm() &&
             camera.model.project(in_camera, &pixel) && pixel.x() >= 0.0 && pixel.x() < 640.0 &&

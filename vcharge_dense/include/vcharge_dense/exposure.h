@@ -9,9 +9,9 @@
 
 namespace vcharge {
 
-/// When a camera without distortion exposes a pixel, after the image's stamp: c0 + m (c1 + c2 r^2 + c3 r^4),
-/// where (x, y) / (z + xi) is the image point of a unit ray, r its length, and m its coordinate across the
-/// lines. The two higher terms are the distortion of the sensor, whose lines are read out.
+/// When a camera without distortion exposes a pixel, after the image's or frame's stamp: c0 + m (c1 + c2 r^2
+/// + c3 r^4), where (x, y) / (z + xi) is the image point of a unit ray, r its length, and m its coordinate
+/// across the lines. The two higher terms are the distortion of the sensor, whose lines are read out.
 struct ExposureTimes {
   bool lines_are_columns = false;
   Eigen::Vector4d coefficients_s = Eigen::Vector4d::Zero();
@@ -30,21 +30,17 @@ struct ExposureTimes {
 /// rad/s the second order moves points by 0.2 mm and directions by 0.001 degrees.
 struct Exposure {
   ExposureTimes times;
-  // Rates of the camera, in its frame at the image's stamp.
+  // Rates of the camera, in its frame at the frame's stamp.
   Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();
   Eigen::Vector3d turn_rate_rad_per_s = Eigen::Vector3d::Zero();
 
   static Exposure of(const ExposureTimes& times, const RigidTransform& vehicle_from_camera,
-                     const VehicleRates& rates);
+                     const ImageMotion& motion);
 
   /// Whether pixels are seen from elsewhere than from where the camera was at the stamp.
   bool moves() const {
     return !times.coefficients_s.isZero(0.0) &&
            !(velocity_m_per_s.isZero(0.0) && turn_rate_rad_per_s.isZero(0.0));
-  }
-  /// A point in the camera's frame at a time after the stamp.
-  Eigen::Vector3d pointAfter(double time_s, const Eigen::Vector3d& point_at_stamp) const {
-    return point_at_stamp - time_s * (turn_rate_rad_per_s.cross(point_at_stamp) + velocity_m_per_s);
   }
 };
 

@@ -47,10 +47,12 @@ ExposureTimes ExposureTimes::of(const RigCamera& camera, const WorkingCamera& wo
 }
 
 Exposure Exposure::of(const ExposureTimes& times, const RigidTransform& vehicle_from_camera,
-                      const VehicleRates& rates) {
+                      const ImageMotion& motion) {
   const Eigen::Quaterniond camera_from_vehicle = vehicle_from_camera.rotation().conjugate();
-  return {times, camera_from_vehicle * rates.velocityOf(vehicle_from_camera.translation()),
-          camera_from_vehicle * Eigen::Vector3d(0.0, 0.0, rates.yaw_rate_rad_per_s)};
+  Exposure exposure{times, camera_from_vehicle * motion.rates.velocityOf(vehicle_from_camera.translation()),
+                    camera_from_vehicle * Eigen::Vector3d(0.0, 0.0, motion.rates.yaw_rate_rad_per_s)};
+  exposure.times.coefficients_s[0] += motion.offset_s;
+  return exposure;
 }
 
 }  // namespace vcharge

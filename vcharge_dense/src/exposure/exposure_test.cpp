@@ -84,12 +84,12 @@ TEST(ExposureTest, TimesAreThoseOfTheSensorsLines) {
 
 TEST(ExposureTest, WithoutReadoutAndOffsetNothingMoves) {
   RigCamera camera = rigCamera(CameraModel(kCamera), ReadoutDirection::kDown, 0.0);
-  EXPECT_TRUE(Exposure::of(timesOf(camera), kFront, kRates).moves());
-  EXPECT_FALSE(Exposure::of(timesOf(camera), kFront, VehicleRates()).moves());
+  EXPECT_TRUE(Exposure::of(timesOf(camera), kFront, {kRates}).moves());
+  EXPECT_FALSE(Exposure::of(timesOf(camera), kFront, ImageMotion()).moves());
   camera.timing.readout_s = 0.0;
-  EXPECT_FALSE(Exposure::of(timesOf(camera), kFront, kRates).moves());
+  EXPECT_FALSE(Exposure::of(timesOf(camera), kFront, {kRates}).moves());
   camera.timing.clock_offset_s = 0.004;
-  EXPECT_TRUE(Exposure::of(timesOf(camera), kFront, kRates).moves());
+  EXPECT_TRUE(Exposure::of(timesOf(camera), kFront, {kRates}).moves());
 }
 
 TEST(ExposureTest, KernelsProjectBetweenLinesOfTwoCameras) {
@@ -105,8 +105,8 @@ TEST(ExposureTest, KernelsProjectBetweenLinesOfTwoCameras) {
                                  false,
                                  {},
                                  {},
-                                 Exposure::of(timesOf(front), kFront, kRates),
-                                 Exposure::of(timesOf(left), kLeft, kRates),
+                                 Exposure::of(timesOf(front), kFront, {kRates}),
+                                 Exposure::of(timesOf(left), kLeft, {kRates}),
                                  kCamera.xi()};
   const Projection projection = neighbour.projection();
   AlignedArray<float> x, y, z, base, weight, u, v;
@@ -165,7 +165,7 @@ TEST(ExposureTest, RangesMoveToWhereTheyWouldBeAtTheStamp) {
     map.standard_deviation_m = 0.01 * map.range_m;
     map.reference = scene.render(kCamera, kSize, poseOfRow(camera, 0.0));
     const RayTable rays(CameraModel(kCamera), kSize, 6.2);
-    const RangeMap moved = rectified(map, rays, Exposure::of(timesOf(camera), vehicle_from_camera, kRates));
+    const RangeMap moved = rectified(map, rays, Exposure::of(timesOf(camera), vehicle_from_camera, {kRates}));
     const int before = countRight(map, truth, 0.003, 8), after = countRight(moved, truth, 0.003, 8);
     EXPECT_GT(after, 0.97 * (kSize.width - 16) * (kSize.height - 16));
     EXPECT_LT(before, 0.9 * after);
@@ -200,7 +200,7 @@ TEST(ExposureTest, SweepsOfRollingShuttersAreAsRightAsThoseOfGlobalOnes) {
   for (const RigidTransform& vehicle_from_camera : {kFront, kLeft}) {
     RigCamera camera =
         rigCamera(CameraModel(kCamera), ReadoutDirection::kDown, 0.0, kSize, vehicle_from_camera);
-    const Exposure exposure = Exposure::of(timesOf(camera), vehicle_from_camera, kRates);
+    const Exposure exposure = Exposure::of(timesOf(camera), vehicle_from_camera, {kRates});
     // Towards the front points move across the lines, towards the side along them.
     const bool is_front = vehicle_from_camera.translation().y() == 0.0;
     const PlaneSweepOptions options;
@@ -287,7 +287,7 @@ double rotationFound(const AnalyticScene& scene, const CameraRig& true_rig, cons
     for (const RigCamera& camera : true_rig.cameras) {
       images.push_back(scene.render(kCamera, kSize, poseOfRow(camera, i * kPeriod_s)));
     }
-    refinement.addFrame(stampOf(i), images, vehicleAt(i * kPeriod_s), kRates);
+    refinement.addFrame(stampOf(i), images, vehicleAt(i * kPeriod_s), {kRates});
   }
   const RigidTransform motion = vehicleAt(4 * kPeriod_s);
   const MotionRefinement::Result result = refinement.refine(stampOf(0), stampOf(4), motion);

@@ -66,7 +66,7 @@ struct Projection {
   bool is_moving;        ///< whether the rest is used: cameras move while their lines are exposed
   float reference_xi;    ///< of the reference's camera
   LineMotion reference;  ///< of the reference, with the neighbour's axes
-  LineMotion neighbour;
+  LineMotion neighbour;  ///< likewise, with the velocity of a reference that turns with it
 };
 
 /// Rays and inverse ranges of points: rotation * ray + (base + offset * weight) * translation in the

@@ -25,20 +25,42 @@ struct Positions {
   decltype(hn::Lt(VF(), VF())) seen;
 };
 
-/// Points times their inverse ranges.
 struct Points {
   VF x, y, z;
 };
-
-HWY_INLINE VF unifiedDenominator(const Points& points, VF norm, float xi) {
-  return hn::MulAdd(hn::Set(DF(), xi), norm, points.z);
-}
 
 HWY_INLINE VF normOf(const Points& p) {
   return root(hn::MulAdd(p.x, p.x, hn::MulAdd(p.y, p.y, hn::Mul(p.z, p.z))));
 }
 
-/// When the lines that see points are exposed, see ExposureTimes; `inverse`: of their denominators.
+HWY_INLINE VF unifiedDenominator(const Points& points, VF norm, float xi) {
+  return hn::MulAdd(hn::Set(DF(), xi), norm, points.z);
+}
+
+/// The points of rays in the neighbour, times their inverse ranges: at infinity + inverse range * change.
+struct Lines {
+  Points at_infinity, change;
+
+  HWY_INLINE Points at(VF inverse_range) const {
+    return {hn::MulAdd(inverse_range, change.x, at_infinity.x),
+            hn::MulAdd(inverse_range, change.y, at_infinity.y),
+            hn::MulAdd(inverse_range, change.z, at_infinity.z)};
+  }
+  /// Adds time * (turn rate x rays + inverse range * velocity).
+  HWY_INLINE void move(VF time, const LineMotion& motion, const Points& rays) {
+    const DF df;
+    const float* w = motion.turn_rate;
+    const VF a = hn::Set(df, w[0]), b = hn::Set(df, w[1]), c = hn::Set(df, w[2]);
+    at_infinity.x = hn::MulAdd(time, hn::MulSub(b, rays.z, hn::Mul(c, rays.y)), at_infinity.x);
+    at_infinity.y = hn::MulAdd(time, hn::MulSub(c, rays.x, hn::Mul(a, rays.z)), at_infinity.y);
+    at_infinity.z = hn::MulAdd(time, hn::MulSub(a, rays.y, hn::Mul(b, rays.x)), at_infinity.z);
+    change.x = hn::MulAdd(time, hn::Set(df, motion.velocity[0]), change.x);
+    change.y = hn::MulAdd(time, hn::Set(df, motion.velocity[1]), change.y);
+    change.z = hn::MulAdd(time, hn::Set(df, motion.velocity[2]), change.z);
+  }
+};
+
+/// When points are exposed, see ExposureTimes; `inverse`: of their denominators.
 HWY_INLINE VF exposureTime(const LineMotion& motion, const Points& points, VF inverse) {
   const DF df;
   const VF x = hn::Mul(points.x, inverse), y = hn::Mul(points.y, inverse);
@@ -49,54 +71,37 @@ HWY_INLINE VF exposureTime(const LineMotion& motion, const Points& points, VF in
   return hn::MulAdd(motion.lines_are_columns ? x : y, slope, hn::Set(df, c[0]));
 }
 
-/// points + time * (turn rate x of + inverse range * velocity)
-HWY_INLINE Points moved(const Points& points, VF time, const LineMotion& motion, const Points& of,
-                        VF inverse_range) {
+HWY_INLINE VF inverseRange(const RayRow& rays, size_t at) {
   const DF df;
-  const VF a = hn::Set(df, motion.turn_rate[0]), b = hn::Set(df, motion.turn_rate[1]),
-           c = hn::Set(df, motion.turn_rate[2]);
-  const VF x =
-      hn::MulAdd(inverse_range, hn::Set(df, motion.velocity[0]), hn::MulSub(b, of.z, hn::Mul(c, of.y)));
-  const VF y =
-      hn::MulAdd(inverse_range, hn::Set(df, motion.velocity[1]), hn::MulSub(c, of.x, hn::Mul(a, of.z)));
-  const VF z =
-      hn::MulAdd(inverse_range, hn::Set(df, motion.velocity[2]), hn::MulSub(a, of.y, hn::Mul(b, of.x)));
-  return {hn::MulAdd(time, x, points.x), hn::MulAdd(time, y, points.y), hn::MulAdd(time, z, points.z)};
+  return hn::MulAdd(hn::Set(df, rays.offset), hn::Load(df, rays.weight + at), hn::Load(df, rays.base + at));
 }
 
-/// Points in the neighbour's frame when it exposed the lines that see them: from where the reference was when
-/// it exposed its line to its stamp, to the neighbour's stamp, and to the neighbour's line, which is found
-/// where the point would be seen at the stamp.
-HWY_INLINE Points seenInLines(const Projection& p, const Points& rays, const Points& at_stamps,
-                              VF inverse_range) {
+/// Where images are exposed on the move, to first order: from where the reference was when it exposed a ray
+/// to its stamp, and from the neighbour's stamp to where it was when it exposed the line that would see, at
+/// the stamp, the point at `inverse_range`.
+HWY_INLINE Lines linesOf(const Projection& p, const RayRow& rays, size_t at, VF inverse_range) {
   const DF df;
-  const VF one = hn::Set(df, 1.0f);
-  const VF of_reference =
-      exposureTime(p.reference, rays, reciprocal(unifiedDenominator(rays, one, p.reference_xi)));
-  const VF back = hn::Neg(inverse_range);
-  const Points rotated{hn::MulAdd(back, hn::Set(df, p.translation[0]), at_stamps.x),
-                       hn::MulAdd(back, hn::Set(df, p.translation[1]), at_stamps.y),
-                       hn::MulAdd(back, hn::Set(df, p.translation[2]), at_stamps.z)};
-  const Points q = moved(at_stamps, of_reference, p.reference, rotated, inverse_range);
-  const VF of_neighbour = exposureTime(p.neighbour, q, reciprocal(unifiedDenominator(q, normOf(q), p.xi)));
-  return moved(q, hn::Neg(of_neighbour), p.neighbour, q, inverse_range);
-}
-
-HWY_INLINE Positions projectVector(const Projection& p, const RayRow& rays, size_t at) {
-  const DF df;
-  const VF inverse_range =
-      hn::MulAdd(hn::Set(df, rays.offset), hn::Load(df, rays.weight + at), hn::Load(df, rays.base + at));
-  const VF x = hn::Load(df, rays.x + at), y = hn::Load(df, rays.y + at), z = hn::Load(df, rays.z + at);
-  const auto transformed = [&](int axis) HWY_ATTR {
+  const Points ray{hn::Load(df, rays.x + at), hn::Load(df, rays.y + at), hn::Load(df, rays.z + at)};
+  const auto along = [&](int axis) HWY_ATTR {
     const float* r = p.rotation + 3 * axis;
-    const VF rotated =
-        hn::MulAdd(hn::Set(df, r[0]), x, hn::MulAdd(hn::Set(df, r[1]), y, hn::Mul(hn::Set(df, r[2]), z)));
-    return hn::MulAdd(inverse_range, hn::Set(df, p.translation[axis]), rotated);
+    return hn::MulAdd(hn::Set(df, r[0]), ray.x,
+                      hn::MulAdd(hn::Set(df, r[1]), ray.y, hn::Mul(hn::Set(df, r[2]), ray.z)));
   };
-  Points q{transformed(0), transformed(1), transformed(2)};
+  const Points rotated{along(0), along(1), along(2)};
+  Lines lines{rotated,
+              {hn::Set(df, p.translation[0]), hn::Set(df, p.translation[1]), hn::Set(df, p.translation[2])}};
   if (p.is_moving) {
-    q = seenInLines(p, {x, y, z}, q, inverse_range);
+    const Points seen = lines.at(inverse_range);
+    const VF of_ray = reciprocal(unifiedDenominator(ray, hn::Set(df, 1.0f), p.reference_xi));
+    const VF of_seen = reciprocal(unifiedDenominator(seen, normOf(seen), p.xi));
+    lines.move(exposureTime(p.reference, ray, of_ray), p.reference, rotated);
+    lines.move(hn::Neg(exposureTime(p.neighbour, seen, of_seen)), p.neighbour, rotated);
   }
+  return lines;
+}
+
+HWY_INLINE Positions project(const Projection& p, const Points& q) {
+  const DF df;
   const VF norm = normOf(q);
   const VF inverse = reciprocal(unifiedDenominator(q, norm, p.xi));
   const VF u = hn::MulAdd(hn::Mul(hn::Set(df, p.fx), q.x), inverse, hn::Set(df, p.cx));
@@ -106,6 +111,11 @@ HWY_INLINE Positions projectVector(const Projection& p, const RayRow& rays, size
   const auto inside_u = hn::And(hn::Ge(u, hn::Set(df, p.min_x)), hn::Le(u, hn::Set(df, p.max_x)));
   const auto inside_v = hn::And(hn::Ge(v, hn::Set(df, p.min_y)), hn::Le(v, hn::Set(df, p.max_y)));
   return {u, v, hn::And(in_front, hn::And(inside_u, inside_v))};
+}
+
+HWY_INLINE Positions projectVector(const Projection& p, const RayRow& rays, size_t at) {
+  const VF inverse_range = inverseRange(rays, at);
+  return project(p, linesOf(p, rays, at, inverse_range).at(inverse_range));
 }
 
 void projectTarget(const Projection& projection, const RayRow& rays, size_t count, float* u, float* v) {
@@ -202,9 +212,12 @@ void makeStepsTarget(const Projection& projection, const RayRow& rays, float ste
   rays_before.offset -= far * step;
   rays_after.offset += far * step;
   for (size_t i = 0; i < count; i += hn::Lanes(df)) {
-    const Positions before = projectVector(projection, rays_before, i);
-    const Positions middle = projectVector(projection, rays, i);
-    const Positions after = projectVector(projection, rays_after, i);
+    // A few pixels apart, points are exposed at the same time.
+    const VF inverse_range = inverseRange(rays, i);
+    const Lines lines = linesOf(projection, rays, i, inverse_range);
+    const Positions before = project(projection, lines.at(inverseRange(rays_before, i)));
+    const Positions middle = project(projection, lines.at(inverse_range));
+    const Positions after = project(projection, lines.at(inverseRange(rays_after, i)));
     const Steps along_u(before.u, middle.u, after.u, far), along_v(before.v, middle.v, after.v, far);
     const auto seen =
         hn::And(hn::And(before.seen, middle.seen), hn::And(after.seen, hn::And(along_u.fits, along_v.fits)));

@@ -105,8 +105,8 @@ class MotionRefinement::FollowedCamera {
   explicit FollowedCamera(const Camera& camera) : camera_(camera), tracker_(trackerOptions()) {}
 
   void add(Timestamp stamp, const cv::Mat& image, const RigidTransform& odom_from_vehicle,
-           const VehicleRates& rates) {
-    rates_ = rates;
+           const ImageMotion& motion) {
+    motion_ = motion;
     const RigidTransform odom_from_camera = odom_from_vehicle * camera_.vehicle_from_camera;
     ImagePyramid pyramid = tracker_.buildPyramid(image);
     follow(stamp, pyramid, odom_from_camera.inverse() * odom_from_camera_);
@@ -175,14 +175,15 @@ class MotionRefinement::FollowedCamera {
   /// What the last image shows at a position.
   Sight sightOf(const cv::Point2f& position_px, const Eigen::Vector3d& ray_in_camera) const {
     const MeiCamera& model = camera_.model;
-    const double time_s = camera_.times.at(
-        {(position_px.x - model.u0()) / model.gamma1(), (position_px.y - model.v0()) / model.gamma2()});
+    const double time_s =
+        motion_.offset_s + camera_.times.at({(position_px.x - model.u0()) / model.gamma1(),
+                                             (position_px.y - model.v0()) / model.gamma2()});
     const RigidTransform& camera = camera_.vehicle_from_camera;
     const Sight at_exposure{camera.rotation() * ray_in_camera.normalized(), camera.translation()};
     if (time_s == 0.0) {
       return at_exposure;
     }
-    const RigidTransform stamp_from_exposure = rates_.motionAfter(time_s);
+    const RigidTransform stamp_from_exposure = motion_.rates.motionAfter(time_s);
     return {stamp_from_exposure.rotation() * at_exposure.ray, stamp_from_exposure * at_exposure.position_m};
   }
 
@@ -253,7 +254,7 @@ class MotionRefinement::FollowedCamera {
   const PatchTracker tracker_;
   ImagePyramid pyramid_;             // the last image
   RigidTransform odom_from_camera_;  // at the last image
-  VehicleRates rates_;               // at the last image
+  ImageMotion motion_;               // at the last image
   std::vector<Point> points_;        // in the last image
   std::deque<Point> lost_;           // not in it, in the order in which they were lost
 };
@@ -269,10 +270,10 @@ MotionRefinement::MotionRefinement(const std::vector<std::optional<Camera>>& cam
 MotionRefinement::~MotionRefinement() = default;
 
 void MotionRefinement::addFrame(Timestamp stamp, const std::vector<cv::Mat>& images,
-                                const RigidTransform& odom_from_vehicle, const VehicleRates& rates) {
+                                const RigidTransform& odom_from_vehicle, const FrameMotion& motion) {
   tbb::parallel_for(size_t{0}, cameras_.size(), [&](size_t i) {
     if (cameras_[i] && !images[i].empty()) {
-      cameras_[i]->add(stamp, images[i], odom_from_vehicle, rates);
+      cameras_[i]->add(stamp, images[i], odom_from_vehicle, motion.of(i));
     }
   });
 }

@@ -40,9 +40,9 @@ class MotionRefinement {
   ~MotionRefinement();
 
   /// Follows the points of each camera into its next image (CV_8UC1 of its size; empty: none). Stamps must
-  /// rise. `odom_from_vehicle` predicts the points; `rates` tell from where a line saw them.
+  /// rise. `odom_from_vehicle` predicts the points; `motion` tells from where a line saw them.
   void addFrame(Timestamp stamp, const std::vector<cv::Mat>& images, const RigidTransform& odom_from_vehicle,
-                const VehicleRates& rates = {});
+                const FrameMotion& motion = {});
   /// Drops what was observed before this stamp.
   void forgetBefore(Timestamp stamp);
   void clear();

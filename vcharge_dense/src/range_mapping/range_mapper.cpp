@@ -107,6 +107,7 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
   assembler_ = std::make_unique<ImageFrameAssembler>(
       cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
       [this](DriveBreak drive_break, Timestamp /*stamp*/) { startOver(drive_break); }, is_used);
+  assembler_->joinStamps(rig_->stamp_tolerance_s);
 }
 
 RangeMapper::~RangeMapper() = default;
@@ -160,7 +161,8 @@ void RangeMapper::process(const ImageFrame& frame) {
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
       working[camera->index] = &camera->working_camera;
-      exposures[camera->index] = Exposure::of(camera->times, camera->vehicle_from_camera, frame.rates);
+      exposures[camera->index] =
+          Exposure::of(camera->times, camera->vehicle_from_camera, frame.motion.of(camera->index));
     }
   }
   WorkingImages images(frame, std::move(working), std::move(exposures), condition_, stereo_.get());
@@ -191,7 +193,7 @@ void RangeMapper::followPoints(const ImageFrame& frame, WorkingImages* images) {
     }
   }
   motion_->forgetBefore(oldest);
-  motion_->addFrame(frame.stamp, followed, *frame.odom_from_vehicle, frame.rates);
+  motion_->addFrame(frame.stamp, followed, *frame.odom_from_vehicle, frame.motion);
 }
 
 void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections) {

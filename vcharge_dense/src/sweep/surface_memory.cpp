@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Core>
 
+#include "exposure/row_times.h"
 #include "kernels/pooled_mat.h"
 #include "sweep/coarse_pass.h"
 #include "vcharge_core/base/wide_loops.h"
@@ -41,10 +42,11 @@ bool isKnown(float value) {
 struct MovedRow {
   std::vector<float> x, y, z;  // points in the reference's frame
   std::vector<float> u, v;
+  std::vector<float> time_s;         // of exposure, after the stamp
   std::vector<float> inverse_range;  // not positive where a range is unknown or the point invisible
 
   explicit MovedRow(size_t columns)
-      : x(columns), y(columns), z(columns), u(columns), v(columns), inverse_range(columns) {}
+      : x(columns), y(columns), z(columns), u(columns), v(columns), time_s(columns), inverse_range(columns) {}
 };
 
 VCHARGE_WIDE_LOOPS void moveRow(const SweepLevel& level, const cv::Mat& range_m, int y,
@@ -87,15 +89,19 @@ VCHARGE_WIDE_LOOPS void projectRow(const MeiCamera& camera, MovedRow* row) {
   }
 }
 
-/// Moves points to where the reference sees them from when it exposes the lines that they are projected to.
-void exposeRow(const MeiCamera& camera, const Exposure& exposure, MovedRow* row) {
+/// Moves points to where they are in the reference's frame at these times.
+VCHARGE_WIDE_LOOPS void exposeRow(const Exposure& exposure, MovedRow* row) {
+  const Eigen::Vector3f velocity = exposure.velocity_m_per_s.cast<float>();
+  const Eigen::Vector3f turn = exposure.turn_rate_rad_per_s.cast<float>();
+  const float vx = velocity.x(), vy = velocity.y(), vz = velocity.z();
+  const float wx = turn.x(), wy = turn.y(), wz = turn.z();
+  float *x = row->x.data(), *y = row->y.data(), *z = row->z.data();
+  const float* time_s = row->time_s.data();
   for (size_t i = 0; i < row->x.size(); ++i) {
-    const double time_s = exposure.times.at(
-        {(row->u[i] - camera.u0()) / camera.gamma1(), (row->v[i] - camera.v0()) / camera.gamma2()});
-    const Eigen::Vector3d seen = exposure.pointAfter(time_s, {row->x[i], row->y[i], row->z[i]});
-    row->x[i] = static_cast<float>(seen.x());
-    row->y[i] = static_cast<float>(seen.y());
-    row->z[i] = static_cast<float>(seen.z());
+    const float px = x[i], py = y[i], pz = z[i];
+    x[i] = px - time_s[i] * (wy * pz - wz * py + vx);
+    y[i] = py - time_s[i] * (wz * px - wx * pz + vy);
+    z[i] = pz - time_s[i] * (wx * py - wy * px + vz);
   }
 }
 
@@ -126,7 +132,9 @@ SurfaceMemory::SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m,
     moveRow(level, range_m, y, reference_from_earlier, &row);
     projectRow(level.camera(), &row);
     if (exposure.moves()) {
-      exposeRow(level.camera(), exposure, &row);
+      exposureTimesOfRow(level.camera(), exposure.times, row.u.data(), row.v.data(), row.u.size(),
+                         row.time_s.data());
+      exposeRow(exposure, &row);
       projectRow(level.camera(), &row);
     }
     for (size_t i = 0; i < row.u.size(); ++i) {

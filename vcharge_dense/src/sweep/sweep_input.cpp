@@ -108,6 +108,8 @@ Projection SweepNeighbour::projection() const {
   p.reference_xi = static_cast<float>(reference_xi);
   p.reference = lineMotion(reference_exposure, neighbour_from_reference);
   p.neighbour = lineMotion(exposure, Eigen::Matrix3f::Identity());
+  Eigen::Map<Eigen::Vector3f>(p.neighbour.velocity) +=
+      exposure.turn_rate_rad_per_s.cast<float>().cross(translation_m);
   return p;
 }
 

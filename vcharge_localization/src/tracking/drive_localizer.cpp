@@ -170,7 +170,7 @@ LocalizationResult DriveLocalizer::process(const ImageFrame& frame) {
   RigFeatures features;
   {
     const StageTimer timer("features", &result.stage_s);
-    features = localizer_.extract(health_.usableImages(frame), frame.rates);
+    features = localizer_.extract(health_.usableImages(frame), frame.motion);
   }
   localize(frame, features, &result);
   return result;

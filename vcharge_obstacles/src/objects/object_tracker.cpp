@@ -59,6 +59,7 @@ ObjectTracker::ObjectTracker(std::shared_ptr<const CameraRig> rig, const ObjectT
   assembler_ = std::make_unique<ImageFrameAssembler>(
       cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
       [this](DriveBreak /*drive_break*/, Timestamp /*stamp*/) { startOver(); }, is_used);
+  assembler_->joinStamps(rig_->stamp_tolerance_s);
 }
 
 ObjectTracker::~ObjectTracker() = default;

@@ -22,7 +22,7 @@ using internal::throwBadField;
 
 constexpr double kFullCircle = 6.283185307179587;
 // Longer ones are milliseconds or microseconds by mistake.
-constexpr double kMaxReadout_s = 0.2, kMaxClockOffset_s = 1.0;
+constexpr double kMaxReadout_s = 0.2, kMaxClockOffset_s = 1.0, kMaxStampTolerance_s = 0.1;
 
 /// A node with its file and key, so that every error names both.
 struct Entry {
@@ -259,7 +259,7 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
   if (!root.IsMap()) {
     throw InputError(source + ": expected a rig with the keys vehicle_frame and cameras");
   }
-  checkKeys(root, source, "", {"vehicle_frame", "provenance", "scale_sigma", "cameras"});
+  checkKeys(root, source, "", {"vehicle_frame", "provenance", "scale_sigma", "stamp_tolerance_s", "cameras"});
   CameraRig rig;
   if (root["provenance"].IsDefined()) {
     rig.provenance = readProvenance(top.required("provenance"));
@@ -268,6 +268,14 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
     rig.vehicle_frame = top.required("vehicle_frame").text();
   }
   rig.scale_sigma = readSigma(top, "scale_sigma");
+  if (root["stamp_tolerance_s"].IsDefined()) {
+    const Entry tolerance = top.required("stamp_tolerance_s");
+    rig.stamp_tolerance_s = tolerance.number();
+    if (!(rig.stamp_tolerance_s >= 0.0 && rig.stamp_tolerance_s <= kMaxStampTolerance_s)) {
+      tolerance.fail("seconds from 0 to " + exact(kMaxStampTolerance_s) +
+                     ", at most half a period of the cameras");
+    }
+  }
   const Entry cameras = top.required("cameras");
   if (!cameras.node.IsMap() || cameras.node.size() == 0) {
     cameras.fail("a map from camera names to cameras");
@@ -302,6 +310,9 @@ std::string formatCameraRig(const CameraRig& rig) {
   }
   if (rig.scale_sigma > 0.0) {
     text += "scale_sigma: " + exact(rig.scale_sigma) + "\n";
+  }
+  if (rig.stamp_tolerance_s > 0.0) {
+    text += "stamp_tolerance_s: " + exact(rig.stamp_tolerance_s) + "\n";
   }
   text += "cameras:\n";
   for (const RigCamera& camera : rig.cameras) {

@@ -93,6 +93,7 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   rig.cameras[0].mask = cv::Mat(800, 1280, CV_8UC1, cv::Scalar(255));
   rig.cameras[0].mask.at<uint8_t>(3, 4) = 0;
   rig.scale_sigma = 0.1 / 3.0;
+  rig.stamp_tolerance_s = 0.04 / 3.0;
   rig.cameras[0].focal_sigma = 1e-4 / 3.0;
   rig.cameras[0].principal_point_sigma_px = 0.1 / 3.0;
   rig.cameras[0].timing = {0.02 / 3.0, ReadoutDirection::kLeft, -0.01 / 3.0};
@@ -101,6 +102,7 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   const CameraRig read = readCameraRig(folder + "/rig.yaml");
   EXPECT_EQ(read.provenance, rig.provenance);
   EXPECT_EQ(read.scale_sigma, rig.scale_sigma);
+  EXPECT_EQ(read.stamp_tolerance_s, rig.stamp_tolerance_s);
   EXPECT_EQ(read.cameras[0].focal_sigma, rig.cameras[0].focal_sigma);
   EXPECT_EQ(read.cameras[0].principal_point_sigma_px, rig.cameras[0].principal_point_sigma_px);
   EXPECT_EQ(read.cameras[1].focal_sigma, 0.0);
@@ -149,6 +151,8 @@ TEST(CameraRigTest, ScaleAddsToTheCovarianceAlongTheTranslation) {
 }
 
 TEST(CameraRigTest, EveryErrorNamesFileKeyAndExpectation) {
+  EXPECT_THAT(errorOf(replaced(kRig, "cameras:", "stamp_tolerance_s: 40\ncameras:")),
+              AllOf(HasSubstr("rig.yaml"), HasSubstr("stamp_tolerance_s"), HasSubstr("from 0 to 0.1")));
   EXPECT_THAT(errorOf(replaced(kRig, "cameras:", "scale_sigma: -0.1\ncameras:")),
               AllOf(HasSubstr("rig.yaml"), HasSubstr("scale_sigma"), HasSubstr("at least 0")));
   EXPECT_THAT(errorOf(replaced(kRig, "  front:", "  front left:")),

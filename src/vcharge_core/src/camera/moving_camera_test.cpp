@@ -19,7 +19,7 @@ RigCamera makeCamera() {
 TEST(MovingCameraTest, StandsWhileAllLinesAreExposedAtOnce) {
   const RigCamera camera = makeCamera();
   const RigidTransform map_from_vehicle = RigidTransform::planar(1.0, 2.0, 0.3);
-  const MovingCamera moving(camera, map_from_vehicle, {4.0, 0.5});
+  const MovingCamera moving(camera, map_from_vehicle, {{4.0, 0.5}});
   const RigidTransform map_from_camera = map_from_vehicle * *camera.vehicle_from_camera;
   const Eigen::Vector3d point_m(3.0, 6.0, 0.5);
   EXPECT_EQ(moving.poseAt({100.0, 30.0}).translation(), map_from_camera.translation());
@@ -29,7 +29,7 @@ TEST(MovingCameraTest, StandsWhileAllLinesAreExposedAtOnce) {
 TEST(MovingCameraTest, MovesWithTheVehicleFromLineToLine) {
   RigCamera camera = makeCamera();
   camera.timing = {0.04, ReadoutDirection::kDown, 0.01};
-  const MovingCamera moving(camera, RigidTransform(), {5.0, 0.0});
+  const MovingCamera moving(camera, RigidTransform(), {{5.0, 0.0}});
   // The last line is exposed 0.01 s + half of the readout after the stamp.
   const Eigen::Vector3d moved_m =
       moving.poseAt({100.0, 399.5}).translation() - moving.mapFromCamera().translation();
@@ -39,7 +39,7 @@ TEST(MovingCameraTest, MovesWithTheVehicleFromLineToLine) {
 TEST(MovingCameraTest, SeesAPointWhereItsLineWasExposed) {
   RigCamera camera = makeCamera();
   camera.timing = {0.03, ReadoutDirection::kDown, 0.0};
-  const MovingCamera moving(camera, RigidTransform::planar(1.0, 2.0, 0.3), {4.0, 0.6});
+  const MovingCamera moving(camera, RigidTransform::planar(1.0, 2.0, 0.3), {{4.0, 0.6}});
   const Eigen::Vector3d point_m(3.0, 5.0, -0.5);
   Eigen::Vector2d pixel;
   ASSERT_TRUE(camera.model.project(moving.pointInCamera(point_m), &pixel));

@@ -1,10 +1,11 @@
 #include "vcharge_core/frames/frame_assembler.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include <cmath>
 
 namespace vcharge {
 namespace {
@@ -253,7 +254,7 @@ TEST_F(FrameAssemblerTest, TakesPosesFromATrajectory) {
   send(0.3, {0, 1, 2});
   ASSERT_EQ(frames_.size(), 2u);
   EXPECT_NEAR(frames_[0].odom_from_vehicle->translation().x(), 1.0, 1e-9);
-  EXPECT_NEAR(frames_[0].rates.forward_speed_m_per_s, 10.0, 1e-9);
+  EXPECT_NEAR(frames_[0].motion.rates.forward_speed_m_per_s, 10.0, 1e-9);
   EXPECT_FALSE(frames_[1].odom_from_vehicle.has_value());
 }
 
@@ -266,8 +267,67 @@ TEST_F(FrameAssemblerTest, TakesRatesFromTheOdometry) {
   }
   send(0.1, {0, 1, 2});
   ASSERT_EQ(frames_.size(), 1u);
-  EXPECT_NEAR(frames_[0].rates.forward_speed_m_per_s, 3.1, 1e-9);
-  EXPECT_NEAR(frames_[0].rates.yaw_rate_rad_per_s, -0.4, 1e-9);
+  EXPECT_NEAR(frames_[0].motion.rates.forward_speed_m_per_s, 3.1, 1e-9);
+  EXPECT_NEAR(frames_[0].motion.rates.yaw_rate_rad_per_s, -0.4, 1e-9);
+}
+
+/// Cameras that start at times of their own, each every 80 ms; returns the frames after all have started.
+std::vector<ImageFrame> freeRunningFrames(const std::vector<double>& phases_s, double tolerance_s,
+                                          double camera_0_ends_s = 1e9) {
+  std::vector<ImageFrame> frames;
+  ImageFrameAssembler assembler(3, FrameAssemblerOptions::waiting(0.2, 0.3),
+                                [&](ImageFrame frame) { frames.push_back(std::move(frame)); });
+  assembler.joinStamps(tolerance_s);
+  std::vector<std::pair<double, size_t>> images;
+  for (int i = 0; i < 20; ++i) {
+    for (size_t camera = 0; camera < phases_s.size(); ++camera) {
+      images.emplace_back(0.08 * i + phases_s[camera], camera);
+    }
+  }
+  std::sort(images.begin(), images.end());
+  for (const auto& [time_s, camera] : images) {
+    assembler.addOdometry(odometryAt(time_s, 5.0 * time_s));
+    if (camera != 0 || time_s < camera_0_ends_s) {
+      assembler.addImage(camera, at(time_s), picture());
+    }
+  }
+  assembler.finish();
+  return frames;
+}
+
+TEST(JoinedStampsTest, EachPeriodIsAFrameWithTheFirstCamerasStamp) {
+  for (const double second_s : {0.01, 0.035, 0.05, 0.079}) {
+    const std::vector<ImageFrame> frames = freeRunningFrames({0.0, second_s, 0.03}, 0.04);
+    ASSERT_GE(frames.size(), 19u) << second_s;
+    for (size_t i = 1; i + 1 < 19; ++i) {
+      const ImageFrame& frame = frames[i];
+      EXPECT_EQ(frame.has_image, std::vector<bool>(3, true)) << second_s << " " << i;
+      EXPECT_NEAR(toSeconds(frame.stamp - frames[i - 1].stamp), 0.08, 1e-6);
+      const double offset_s = second_s > 0.04 ? second_s - 0.08 : second_s;
+      EXPECT_NEAR(frame.motion.offsetOf(0), 0.0, 1e-6);
+      EXPECT_NEAR(frame.motion.offsetOf(1), offset_s, 1e-6);
+      EXPECT_NEAR(frame.motion.offsetOf(2), 0.03, 1e-6);
+    }
+  }
+}
+
+TEST(JoinedStampsTest, ImagesFurtherApartThanTheToleranceAreNotJoined) {
+  const std::vector<ImageFrame> frames = freeRunningFrames({0.0, 0.007, 0.03}, 0.01);
+  ASSERT_GE(frames.size(), 19u);
+  for (size_t i = 1; i < 18; ++i) {
+    EXPECT_EQ(frames[i].has_image, (std::vector<bool>{true, true, false}));
+  }
+}
+
+TEST(JoinedStampsTest, GoesOnWithTheNextCameraWhereTheFirstFallsSilent) {
+  const std::vector<ImageFrame> frames = freeRunningFrames({0.0, 0.01, 0.03}, 0.04, 0.5);
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().has_image, (std::vector<bool>{false, true, true}));
+  EXPECT_NEAR(frames.back().motion.offsetOf(1), 0.0, 1e-6);
+  EXPECT_NEAR(frames.back().motion.offsetOf(2), 0.02, 1e-6);
+  for (size_t i = 1; i < frames.size(); ++i) {
+    EXPECT_LT(frames[i - 1].stamp, frames[i].stamp);
+  }
 }
 
 TEST_F(FrameAssemblerTest, AReplayStartsOver) {

@@ -19,6 +19,7 @@ struct BundleObservation {
   int32_t camera = 0;
   Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
   double sigma_px = 1.0;
+  double image_offset_s = 0.0;  ///< as in ImageMotion
 };
 
 /// A point that lies on the ground, at z = 0 in the vehicle's frame of a pose.

@@ -38,7 +38,7 @@ class FrameFollower : public DriveConsumer {
 
   void processFrame(const ImageFrame& frame);
   MatchesByCamera track(const std::vector<Image>& images, const RigidTransform& odometry_motion,
-                        const VehicleRates& rates);
+                        const FrameMotion& motion);
   /// Estimates the motion from the previous frame; ends the tracks that contradict it.
   EgoMotion estimateMotion(const MatchesByCamera& matches, const RigidTransform& odometry_motion);
   void addKeyframe(const ImageFrame& frame, const RigidTransform& keyframe_from_vehicle,

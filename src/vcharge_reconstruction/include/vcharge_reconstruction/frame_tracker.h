@@ -63,9 +63,10 @@ class CameraTracker {
   CameraTracker(const RigCamera& camera, const FrameTrackerOptions& options);
 
   /// Tracks all points into the next image; predicts them for a vehicle that moved by
-  /// `previous_from_current` and moves at `rates` now. Appends a match per tracked point, with `camera_index`
-  /// as camera; its rays begin where the camera was at their exposure. An empty image ends all tracks.
-  void track(const Image& image, const RigidTransform& previous_from_current, const VehicleRates& rates,
+  /// `previous_from_current` and moves as `motion` says now. Appends a match per tracked point, with
+  /// `camera_index` as camera; its rays begin where the camera was at their exposure. An empty image ends all
+  /// tracks.
+  void track(const Image& image, const RigidTransform& previous_from_current, const ImageMotion& motion,
              int camera_index, std::vector<RayMatch>* matches);
 
   /// Ends the tracks whose entry in `is_good` (one per match of the last track()) is false.
@@ -87,7 +88,7 @@ class CameraTracker {
   /// unchanged, if it cannot be, or if that is its anchor.
   bool alignWithLastKeyframe(LiveTrack* track) const;
   bool isMasked(const Eigen::Vector2d& position_px) const;
-  Ray rayOf(const LiveTrack& track, const VehicleRates& rates) const;
+  Ray rayOf(const LiveTrack& track, const ImageMotion& motion) const;
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;
 
   const RigCamera& camera_;
@@ -96,7 +97,7 @@ class CameraTracker {
   const cv::Mat mask_;
   const double spacing_px_;
   Image image_;
-  VehicleRates rates_;  // at image_
+  ImageMotion motion_;  // at image_
   ImagePyramid pyramid_;
   std::vector<LiveTrack> tracks_;
   std::map<int32_t, Image> anchors_;  // key: keyframe; kept while a track refers to it

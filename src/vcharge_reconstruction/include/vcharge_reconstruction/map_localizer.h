@@ -81,7 +81,7 @@ struct PoseFix {
 struct RigFeatures {
   std::vector<ImageFeatures> images;             ///< one per camera; empty for a missing image
   std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< bearings of the features; zero if a pixel has none
-  VehicleRates rates;                            ///< of the vehicle at that instant
+  FrameMotion motion;                            ///< of the vehicle at that instant
 };
 
 class LandmarkMatcher;
@@ -100,7 +100,7 @@ class MapLocalizer {
   ~MapLocalizer();
 
   /// Extracts features of the map's kind. Images are in the rig's order, empty where one is missing.
-  RigFeatures extract(const std::vector<Image>& images, const VehicleRates& rates) const;
+  RigFeatures extract(const std::vector<Image>& images, const FrameMotion& motion) const;
 
   /// Tracking: searches for the landmarks in view of the expected pose, estimates the pose by generalized
   /// P3P, and repeats the search more narrowly around the result.

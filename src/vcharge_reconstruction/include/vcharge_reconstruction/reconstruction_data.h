@@ -28,7 +28,7 @@ struct Keyframe {
   Timestamp stamp;
   RigidTransform odom_from_vehicle;   ///< pose counted by the odometer
   RigidTransform map_from_vehicle;    ///< estimated
-  VehicleRates rates;                 ///< counted by the odometer
+  FrameMotion motion;                 ///< counted by the odometer
   double travelled_m = 0.0;           ///< distance by the odometer, since the start of the drive
   std::vector<KeyframeImage> images;  ///< in the rig's order; without features where an image is missing
   int32_t session = 0;                ///< index of the session
@@ -40,8 +40,8 @@ struct Keyframe {
 inline constexpr double kImpreciseSigma_px = 2.5;
 
 /// A camera at a keyframe.
-inline MovingCamera cameraAt(const Keyframe& keyframe, const RigCamera& camera) {
-  return {camera, keyframe.map_from_vehicle, keyframe.rates};
+inline MovingCamera cameraAt(const Keyframe& keyframe, const CameraRig& rig, size_t camera) {
+  return {rig.cameras[camera], keyframe.map_from_vehicle, keyframe.motion.of(camera)};
 }
 
 /// Observation of a track in an image of a keyframe.

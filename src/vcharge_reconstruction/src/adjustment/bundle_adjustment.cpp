@@ -54,7 +54,8 @@ Eigen::Matrix3d conditionalCovariance(const ReconstructionData& data, const Trac
   for (const TrackObservation& observation : track.observations) {
     const RigCamera& camera = data.rig->cameras[observation.camera];
     const RigidTransform map_from_camera =
-        cameraAt(data.keyframes[observation.keyframe], camera).poseAt(observation.position_px);
+        cameraAt(data.keyframes[observation.keyframe], *data.rig, observation.camera)
+            .poseAt(observation.position_px);
     const Eigen::Vector3d to_point = *track.position_m - map_from_camera.translation();
     const Eigen::Vector3d direction = to_point.normalized();
     Eigen::Vector3d ray, shifted_ray;
@@ -118,7 +119,8 @@ bool reprojectionError(const ReconstructionData& data, const Track& track,
                        const TrackObservation& observation, Eigen::Vector2d* error_px) {
   const RigCamera& camera = data.rig->cameras[observation.camera];
   const RigidTransform map_from_camera =
-      cameraAt(data.keyframes[observation.keyframe], camera).poseAt(observation.position_px);
+      cameraAt(data.keyframes[observation.keyframe], *data.rig, observation.camera)
+          .poseAt(observation.position_px);
   Eigen::Vector2d pixel;
   if (!camera.model.project(map_from_camera.inverse() * *track.position_m, &pixel)) {
     return false;
@@ -134,7 +136,7 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Re
   problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
   for (const Keyframe& keyframe : data.keyframes) {
     problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
-    problem.rates.push_back(keyframe.rates);
+    problem.rates.push_back(keyframe.motion.rates);
   }
   for (const Track& track : data.tracks) {
     if (!track.position_m) {
@@ -144,7 +146,8 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Re
     problem.first_observation.push_back(problem.observations.size());
     for (const TrackObservation& observation : track.observations) {
       problem.observations.push_back(
-          {observation.keyframe, observation.camera, observation.position_px, observation.sigma_px});
+          {observation.keyframe, observation.camera, observation.position_px, observation.sigma_px,
+           data.keyframes[observation.keyframe].motion.offsetOf(observation.camera)});
     }
   }
   problem.first_observation.push_back(problem.observations.size());

@@ -56,6 +56,7 @@ std::optional<RigidTransform> BundleErrors::motionToExposure(const BundleState& 
     timing.readout_s += state.timing_deviations[observation.camera][0];
     timing.clock_offset_s += state.timing_deviations[observation.camera][1];
   }
+  timing.clock_offset_s += observation.image_offset_s;
   if (timing.isInstant()) {
     return std::nullopt;
   }

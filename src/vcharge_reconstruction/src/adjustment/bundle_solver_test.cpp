@@ -32,7 +32,7 @@ BundleProblem makeProblem(const std::vector<ImageTiming>& timings = {}) {
     const RigidTransform& pose = data.keyframes[i].map_from_vehicle;
     problem.map_from_vehicle.emplace_back(pose.rotation(), pose.translation() + shift);
     if (!timings.empty()) {
-      problem.rates.push_back(data.keyframes[i].rates);
+      problem.rates.push_back(data.keyframes[i].motion.rates);
     }
     if (i > 0) {
       Eigen::Matrix<double, 6, 1> sigmas;

@@ -27,6 +27,7 @@ FrameFollower::FrameFollower(const ReconstructionOptions& options,
       keyframes_(options, state),
       assembler_(rig_->cameras.size(), options.assemblerOptions(),
                  [this](const ImageFrame& frame) { processFrame(frame); }) {
+  assembler_.joinStamps(rig_->stamp_tolerance_s);
   state_->report.counters = assembler_.counters();
   for (const RigCamera& camera : rig_->cameras) {
     trackers_.emplace_back(camera, options_.tracker);
@@ -79,7 +80,7 @@ void FrameFollower::processFrame(const ImageFrame& frame) {
   }
   previous_odom_from_vehicle_ = odom_from_vehicle;
   travelled_m_ += distance_m;
-  const MatchesByCamera matches = track(images, odometry_motion, frame.rates);
+  const MatchesByCamera matches = track(images, odometry_motion, frame.motion);
   if (is_first) {
     addKeyframe(frame, RigidTransform(), MotionHypothesis::kOdometry);
     return;
@@ -105,10 +106,10 @@ void FrameFollower::processFrame(const ImageFrame& frame) {
 
 FrameFollower::MatchesByCamera FrameFollower::track(const std::vector<Image>& images,
                                                     const RigidTransform& odometry_motion,
-                                                    const VehicleRates& rates) {
+                                                    const FrameMotion& motion) {
   MatchesByCamera matches(trackers_.size());
   tbb::parallel_for(size_t{0}, trackers_.size(), [&](size_t i) {
-    trackers_[i].track(images[i], odometry_motion, rates, static_cast<int>(i), &matches[i]);
+    trackers_[i].track(images[i], odometry_motion, motion.of(i), static_cast<int>(i), &matches[i]);
   });
   return matches;
 }
@@ -135,7 +136,7 @@ void FrameFollower::addKeyframe(const ImageFrame& frame, const RigidTransform& k
   Keyframe keyframe;
   keyframe.stamp = frame.stamp;
   keyframe.odom_from_vehicle = *frame.bridged_from_vehicle;
-  keyframe.rates = frame.rates;
+  keyframe.motion = frame.motion;
   keyframe.map_from_vehicle = map_from_vehicle_;
   keyframe.travelled_m = travelled_m_;
   const int32_t index = keyframes_.addKeyframe(std::move(keyframe), keyframe_from_vehicle, motion);

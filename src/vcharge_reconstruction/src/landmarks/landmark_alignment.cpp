@@ -61,7 +61,7 @@ class LandmarkAlignment {
   }
 
   RigidTransform mapFromCamera(const TrackObservation& seen) const {
-    return cameraAt(data_.keyframes[seen.keyframe], data_.rig->cameras[seen.camera]).poseAt(seen.position_px);
+    return cameraAt(data_.keyframes[seen.keyframe], *data_.rig, seen.camera).poseAt(seen.position_px);
   }
 
   const CameraModel& modelOf(const TrackObservation& seen) const {

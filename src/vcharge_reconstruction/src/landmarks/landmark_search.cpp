@@ -131,7 +131,7 @@ class LandmarkSearch {
                     std::vector<Proposal>* proposals) const {
     const RigCamera& rig_camera = data_.rig->cameras[camera];
     const KeyframeImage& image = data_.keyframes[keyframe].images[camera];
-    const MovingCamera moving = cameraAt(data_.keyframes[keyframe], rig_camera);
+    const MovingCamera moving = cameraAt(data_.keyframes[keyframe], *data_.rig, camera);
     const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
     std::vector<cv::Point2f> predictions;
     std::vector<int32_t> tracks;

@@ -110,7 +110,8 @@ bool observationRay(const ReconstructionData& data, const TrackObservation& obse
     return false;
   }
   const RigidTransform map_from_camera =
-      cameraAt(data.keyframes[observation.keyframe], camera).poseAt(observation.position_px);
+      cameraAt(data.keyframes[observation.keyframe], *data.rig, observation.camera)
+          .poseAt(observation.position_px);
   *ray_in_map = map_from_camera * Ray{Eigen::Vector3d::Zero(), ray_in_camera};
   return true;
 }

@@ -64,7 +64,7 @@ Ray rayOf(const ReconstructionData& data, int32_t keyframe, int camera, int feat
   const KeyframeImage& image = data.keyframes[keyframe].images[camera];
   const cv::Point2f position_px = image.features.keypoints[feature].position_px;
   return rayInVehicle(data.rig->cameras[camera], image.rays_in_camera.col(feature),
-                      {position_px.x, position_px.y}, data.keyframes[keyframe].rates);
+                      {position_px.x, position_px.y}, data.keyframes[keyframe].motion.of(camera));
 }
 
 /// Matches between two keyframes.

@@ -87,7 +87,8 @@ void LandmarkMatcher::add(const RigFeatures& features, size_t camera, const Tile
   const cv::Point2f position_px = features.images[camera].keypoints[static_cast<size_t>(feature)].position_px;
   const MapLandmark& landmark = observation.landmark();
   PointMatch point;
-  point.ray = rayInVehicle(rig_->cameras[camera], ray, {position_px.x, position_px.y}, features.rates);
+  point.ray =
+      rayInVehicle(rig_->cameras[camera], ray, {position_px.x, position_px.y}, features.motion.of(camera));
   point.point_m = landmark.position_m;
   point.camera = static_cast<int>(camera);
   point.quality = -distance;
@@ -99,7 +100,7 @@ void LandmarkMatcher::add(const RigFeatures& features, size_t camera, const Tile
 LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
                                             const RigidTransform& map_from_vehicle, double sigma_m,
                                             double sigma_rad) const {
-  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle, features.rates);
+  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle, features.motion);
   std::vector<LandmarkMatches> of_camera(rig_->cameras.size());
   tbb::parallel_for(size_t{0}, of_camera.size(), [&](size_t camera) {
     const ImageFeatures& image = features.images[camera];

@@ -31,8 +31,8 @@ int32_t TileObservation::numDrives() const {
 }
 
 LandmarkView::LandmarkView(const TiledMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
-                           const RigidTransform& map_from_vehicle, const VehicleRates& rates)
-    : map_(map), rig_(rig), map_from_vehicle_(map_from_vehicle), rates_(rates) {
+                           const RigidTransform& map_from_vehicle, const FrameMotion& motion)
+    : map_(map), rig_(rig), map_from_vehicle_(map_from_vehicle), motion_(motion) {
   for (const size_t keyframe : map.keyframesNear(map_from_vehicle.translation(), options.max_distance_m,
                                                  static_cast<size_t>(options.max_keyframes))) {
     keyframes_.push_back(map.tileOf(keyframe));
@@ -74,7 +74,7 @@ std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d
 
 ExpectedLandmarks LandmarkView::expectedIn(size_t camera) const {
   const RigCamera& rig_camera = rig_.cameras[camera];
-  const MovingCamera moving(rig_camera, map_from_vehicle_, rates_);
+  const MovingCamera moving(rig_camera, map_from_vehicle_, motion_.of(camera));
   const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
   ExpectedLandmarks expected;
   for (const Source& source : sourcesFor(moving.mapFromCamera().translation())) {

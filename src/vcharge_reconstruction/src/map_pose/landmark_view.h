@@ -37,7 +37,7 @@ struct ExpectedLandmarks {
 class LandmarkView {
  public:
   LandmarkView(const TiledMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
-               const RigidTransform& map_from_vehicle, const VehicleRates& rates);
+               const RigidTransform& map_from_vehicle, const FrameMotion& motion);
 
   ExpectedLandmarks expectedIn(size_t camera) const;
 
@@ -51,7 +51,7 @@ class LandmarkView {
   const TiledMap& map_;
   const CameraRig& rig_;
   const RigidTransform& map_from_vehicle_;
-  const VehicleRates& rates_;
+  const FrameMotion& motion_;
   std::vector<KeyframeInTile> keyframes_;  ///< the nearest keyframes
 };
 

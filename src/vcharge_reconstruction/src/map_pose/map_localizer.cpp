@@ -76,12 +76,12 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<
 
 MapLocalizer::~MapLocalizer() = default;
 
-RigFeatures MapLocalizer::extract(const std::vector<Image>& images, const VehicleRates& rates) const {
+RigFeatures MapLocalizer::extract(const std::vector<Image>& images, const FrameMotion& motion) const {
   check(images.size() == rig_->cameras.size(), "MapLocalizer::extract: expected an image per camera");
   RigFeatures features;
   features.images.resize(images.size());
   features.rays_in_camera.resize(images.size());
-  features.rates = rates;
+  features.motion = motion;
   tbb::parallel_for(size_t{0}, images.size(), [&](size_t i) {
     if (images[i].pixels.empty()) {
       return;

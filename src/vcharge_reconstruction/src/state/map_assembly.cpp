@@ -21,6 +21,23 @@ const TrackObservation* describedObservation(const Track& track, const TrackObse
   return best;
 }
 
+/// Where the camera would have seen a landmark at the keyframe's stamp, with the same error: maps know
+/// nothing of lines and clocks.
+Eigen::Vector2d positionAtStamp(const ReconstructionData& data, const Track& track,
+                                const TrackObservation& observation) {
+  const MovingCamera camera = cameraAt(data.keyframes[observation.keyframe], *data.rig, observation.camera);
+  if (!camera.moves()) {
+    return observation.position_px;
+  }
+  const CameraModel& model = data.rig->cameras[observation.camera].model;
+  const RigidTransform exposed_from_map = camera.poseAt(observation.position_px).inverse();
+  Eigen::Vector2d exposed_px, at_stamp_px;
+  return model.project(exposed_from_map * *track.position_m, &exposed_px) &&
+                 model.project(camera.mapFromCamera().inverse() * *track.position_m, &at_stamp_px)
+             ? observation.position_px + (at_stamp_px - exposed_px)
+             : observation.position_px;
+}
+
 }  // namespace
 
 std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
@@ -56,8 +73,8 @@ std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
         continue;
       }
       is_described = true;
-      contents.observations.push_back(
-          {observation.keyframe, observation.camera, landmark, observation.position_px.cast<float>()});
+      contents.observations.push_back({observation.keyframe, observation.camera, landmark,
+                                       positionAtStamp(data, track, observation).cast<float>()});
       descriptors.push_back(
           data.keyframes[described->keyframe].images[described->camera].features.descriptors.row(
               described->feature));

@@ -28,20 +28,6 @@ KeyframeImage imageOf(const SparseMap& map, size_t keyframe, size_t camera) {
   return image;
 }
 
-/// Rates at a keyframe from the ones before and after it, in its session.
-VehicleRates ratesAt(const std::vector<MapKeyframe>& keyframes, size_t i) {
-  const auto neighbour = [&](size_t other) -> const MapKeyframe& {
-    return other < keyframes.size() && keyframes[other].session == keyframes[i].session ? keyframes[other]
-                                                                                        : keyframes[i];
-  };
-  const MapKeyframe& before = neighbour(i == 0 ? 0 : i - 1);
-  const MapKeyframe& after = neighbour(i + 1);
-  return after.stamp > before.stamp
-             ? VehicleRates::between(before.map_from_vehicle.inverse() * after.map_from_vehicle,
-                                     toSeconds(after.stamp - before.stamp))
-             : VehicleRates();
-}
-
 }  // namespace
 
 ReconstructionData reconstructionOf(const SparseMap& map, double observation_sigma_px) {
@@ -71,7 +57,6 @@ ReconstructionData reconstructionOf(const SparseMap& map, double observation_sig
     Keyframe keyframe;
     keyframe.stamp = from.stamp;
     keyframe.odom_from_vehicle = keyframe.map_from_vehicle = from.map_from_vehicle;
-    keyframe.rates = ratesAt(map.keyframes(), i);
     keyframe.travelled_m = travelled_m;
     keyframe.session = from.session;
     keyframe.map_id = from.id;

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "vcharge_reconstruction/bundle_adjustment.h"
 #include "vcharge_reconstruction/testing/test_drive.h"
 
 namespace vcharge {
@@ -102,6 +103,57 @@ TEST_F(ExtendReconstructionTest, ObservationsGoToTheTrackThatTheirsWasJoinedTo) 
 TEST_F(ExtendReconstructionTest, RefusesAStateOfAnotherDrive) {
   followed_.data.keyframes.resize(10);
   EXPECT_THROW(extendReconstruction(followed_, &adjusted_), std::logic_error);
+}
+
+/// A drive past unlike points, whose cameras expose their lines one after the other and at times of their
+/// own.
+ReconstructionState exposedDrive() {
+  testing::TestDriveOptions options;
+  options.num_points = 200;
+  options.timings = {{0.02, ReadoutDirection::kDown, 0.001}, {0.015, ReadoutDirection::kRight, 0.0}};
+  options.image_offsets_s = {0.0, 0.03};
+  ReconstructionState state;
+  state.data = testing::makeTestDrive(options);
+  for (Track& track : state.data.tracks) {
+    for (TrackObservation& observation : track.observations) {
+      cv::Mat& descriptors =
+          state.data.keyframes[observation.keyframe].images[observation.camera].features.descriptors;
+      observation.feature = descriptors.rows;
+      observation.position_px += Eigen::Vector2d(0.3, -0.2);  // an error
+      descriptors.push_back(cv::Mat(1, 32, CV_8UC1, cv::Scalar(observation.feature % 256)));
+    }
+  }
+  return state;
+}
+
+double worstDeviation(const ReconstructionData& data, const Eigen::Vector2d& usual_error_px) {
+  double worst_px = 0.0;
+  for (const Track& track : data.tracks) {
+    for (const TrackObservation& observation : track.observations) {
+      Eigen::Vector2d error_px;
+      EXPECT_TRUE(reprojectionError(data, track, observation, &error_px));
+      worst_px = std::max(worst_px, (error_px - usual_error_px).norm());
+    }
+  }
+  return worst_px;
+}
+
+TEST(MapOfExposedLines, HoldsWhatCamerasWouldHaveSeenAtTheStamps) {
+  const ReconstructionState state = exposedDrive();
+  const Eigen::Vector2d error_px(-0.3, 0.2);
+  EXPECT_LT(worstDeviation(state.data, error_px), 0.05);  // lines of the observations with the error
+  const std::shared_ptr<const SparseMap> map = assembleMap(state, "");
+  const ReconstructionData again = reconstructionOf(*map, 1.0);
+  ASSERT_GT(again.tracks.size(), 50U);
+  EXPECT_LT(worstDeviation(again, error_px), 0.05);
+  // As if all had been exposed at the stamp.
+  ReconstructionData at_stamp = again;
+  auto rig = std::make_shared<CameraRig>(*again.rig);
+  for (RigCamera& camera : rig->cameras) {
+    camera.timing = ImageTiming();
+  }
+  at_stamp.rig = rig;
+  EXPECT_LT(worstDeviation(at_stamp, error_px), 0.05);
 }
 
 }  // namespace

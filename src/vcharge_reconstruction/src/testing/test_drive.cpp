@@ -50,7 +50,8 @@ ReconstructionData makeTestDrive(const TestDriveOptions& options) {
     keyframe.travelled_m = options.step_m * i;
     keyframe.images.resize(data.rig->cameras.size());
     const double hurry = 1.0 + 0.7 * std::sin(0.9 * i);
-    keyframe.rates = {hurry * options.step_m / kPeriod_s, hurry * options.turn_rad / kPeriod_s};
+    keyframe.motion.rates = {hurry * options.step_m / kPeriod_s, hurry * options.turn_rad / kPeriod_s};
+    keyframe.motion.image_offsets_s = options.image_offsets_s;
     data.keyframes.push_back(keyframe);
     const double half_rad = 0.5 * options.turn_rad;
     const auto step = [&](double length_m) {
@@ -70,7 +71,7 @@ ReconstructionData makeTestDrive(const TestDriveOptions& options) {
       Track track;
       track.position_m = point;
       for (int32_t k = 0; k < options.num_keyframes; ++k) {
-        const Eigen::Vector3d in_camera = cameraAt(data.keyframes[k], rig_camera).pointInCamera(point);
+        const Eigen::Vector3d in_camera = cameraAt(data.keyframes[k], *data.rig, camera).pointInCamera(point);
         Eigen::Vector2d pixel;
         if (in_camera.norm() < kMaxRange_m && in_camera.norm() > 1.0 &&
             in_camera.z() > std::cos(0.5 * rig_camera.field_of_view_rad) * in_camera.norm() &&

@@ -119,9 +119,9 @@ CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions&
       mask_(makeFeatureMask(camera)),
       spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {}
 
-Ray CameraTracker::rayOf(const LiveTrack& track, const VehicleRates& rates) const {
+Ray CameraTracker::rayOf(const LiveTrack& track, const ImageMotion& motion) const {
   return camera_.vehicle_from_camera
-             ? rayInVehicle(camera_, track.ray_in_camera, {track.position_px.x, track.position_px.y}, rates)
+             ? rayInVehicle(camera_, track.ray_in_camera, {track.position_px.x, track.position_px.y}, motion)
              : Ray{Eigen::Vector3d::Zero(), track.ray_in_camera};
 }
 
@@ -142,10 +142,10 @@ cv::Point2f CameraTracker::predict(const LiveTrack& track,
 }
 
 void CameraTracker::track(const Image& image, const RigidTransform& previous_from_current,
-                          const VehicleRates& rates, int camera_index, std::vector<RayMatch>* matches) {
-  const VehicleRates previous_rates = rates_;
+                          const ImageMotion& motion, int camera_index, std::vector<RayMatch>* matches) {
+  const ImageMotion previous_motion = motion_;
   image_ = image;
-  rates_ = rates;
+  motion_ = motion;
   if (image.pixels.empty()) {
     tracks_.clear();
     anchors_.clear();
@@ -173,8 +173,8 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
         continue;
       }
       RayMatch match;
-      match.previous = rayOf(tracks_[i], previous_rates);
-      match.current = rayOf(next, rates);
+      match.previous = rayOf(tracks_[i], previous_motion);
+      match.current = rayOf(next, motion);
       match.previous_camera = match.current_camera = camera_index;
       matches->push_back(match);
       kept.push_back(next);

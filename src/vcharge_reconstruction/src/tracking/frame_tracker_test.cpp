@@ -62,7 +62,7 @@ class WallDrive {
     CameraTracker tracker(camera, options);
     for (int frame = 0; frame <= (num_keyframes - 1) * kFramesPerKeyframe; ++frame) {
       std::vector<RayMatch> matches;
-      tracker.track(look(wall, scaleAt(frame), frame * shift_per_frame_px), RigidTransform(), VehicleRates(),
+      tracker.track(look(wall, scaleAt(frame), frame * shift_per_frame_px), RigidTransform(), ImageMotion(),
                     0, &matches);
       if (frame % kFramesPerKeyframe == 0) {
         const auto keyframe = static_cast<int32_t>(data.keyframes.size());
@@ -144,7 +144,7 @@ TEST(FrameTrackerTest, EndsAllTracksWhereAnImageIsMissing) {
   std::vector<RayMatch> matches;
   for (int32_t keyframe = 0; keyframe < 3; ++keyframe) {
     data.keyframes[keyframe].images.resize(1);
-    tracker.track(keyframe == 1 ? Image() : look(wall, 1.0, 0.0), RigidTransform(), VehicleRates(), 0,
+    tracker.track(keyframe == 1 ? Image() : look(wall, 1.0, 0.0), RigidTransform(), ImageMotion(), 0,
                   &matches);
     tracker.readKeyframe(keyframe, *makeFeatureExtractor(), &data.keyframes[keyframe].images[0]);
     tracker.addKeyframe(keyframe, 0, &data);

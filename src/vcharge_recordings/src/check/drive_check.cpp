@@ -119,7 +119,7 @@ std::vector<CheckFinding> DriveChecker::findings() const {
     times.judgeRate(name, kMaxImageGap_s, &findings);
     state_->images[i].judge(&findings);
   }
-  internal::judgeSync(stamps_by_camera, period_s, &findings);
+  internal::judgeSync(stamps_by_camera, period_s, state_->rig->stamp_tolerance_s, &findings);
   if (state_->odometry_times.empty()) {
     findings.add("odometry", CheckGrade::kFail, "no odometry with stamps");
     return findings.take();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace vcharge::internal {
 namespace {
@@ -116,7 +115,7 @@ void TopicTimes::judgeRate(const std::string& subject, double max_gap_s, CheckFi
 }
 
 void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, double period_s,
-               CheckFindings* findings) {
+               double tolerance_s, CheckFindings* findings) {
   // Only in the time in which all cameras run; silent cameras have a finding of their own.
   std::vector<const std::vector<Timestamp>*> cameras;
   for (const std::vector<Timestamp>& stamps : stamps_by_camera) {
@@ -127,20 +126,32 @@ void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, doub
   if (cameras.size() < 2) {
     return;
   }
-  std::map<Timestamp, size_t> counts;
   Timestamp begin = cameras.front()->front(), end = cameras.front()->back();
   for (const auto* stamps : cameras) {
     begin = std::max(begin, stamps->front());
     end = std::min(end, stamps->back());
-    for (const Timestamp stamp : *stamps) {
-      ++counts[stamp];
+  }
+  const Duration tolerance = durationFromSeconds(tolerance_s);
+  std::vector<Timestamp> instants = *cameras.front();
+  for (const auto* stamps : cameras) {
+    if (tolerance_s == 0.0) {
+      instants.insert(instants.end(), stamps->begin(), stamps->end());
     }
   }
+  std::sort(instants.begin(), instants.end());
+  instants.erase(std::unique(instants.begin(), instants.end()), instants.end());
   int64_t num_incomplete = 0, num_instants = 0;
-  for (const auto& [stamp, count] : counts) {
+  for (const Timestamp stamp : instants) {
     if (begin <= stamp && stamp <= end) {
       ++num_instants;
-      num_incomplete += count < cameras.size() ? 1 : 0;
+      num_incomplete += std::all_of(cameras.begin(), cameras.end(),
+                                    [&](const auto* stamps) {
+                                      const auto next =
+                                          std::lower_bound(stamps->begin(), stamps->end(), stamp - tolerance);
+                                      return next != stamps->end() && *next <= stamp + tolerance;
+                                    })
+                            ? 0
+                            : 1;
     }
   }
   if (num_instants == 0) {
@@ -154,11 +165,13 @@ void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, doub
   const std::string figure = "all " + std::to_string(cameras.size()) + " cameras at " +
                              percentText(1.0 - fractionOf(num_incomplete, num_instants)) + " of " +
                              std::to_string(num_instants) + " instants";
-  if (skew > 0.0) {
-    findings->add("sync", CheckGrade::kFail,
-                  figure + ", usual stamps " + toText(1e3 * skew, 2) + " ms apart" +
-                      (skew < 0.5 * period_s ? "" : " (more than half a period)") +
-                      ": images of one trigger pulse need one stamp");
+  if (skew > tolerance_s) {
+    findings->add(
+        "sync", CheckGrade::kFail,
+        figure + ", usual stamps " + toText(1e3 * skew, 2) + " ms apart" +
+            (skew < 0.5 * period_s ? "" : " (more than half a period)") +
+            ": images of one trigger pulse need one stamp; cameras without one need stamp_tolerance_s in "
+            "rig.yaml");
     return;
   }
   findings->atMost("sync", fractionOf(num_incomplete, num_instants), kManyIncomplete, kTooManyIncomplete,

@@ -30,8 +30,9 @@ class TopicTimes {
   int64_t num_backwards_ = 0, num_repeated_ = 0, num_unstamped_ = 0;
 };
 
-/// Checks whether the cameras' images of one instant have the same stamp.
+/// Checks whether the cameras' images of one instant have the same stamp, or with a tolerance, whether each
+/// image of the first camera has one of every other within it.
 void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, double period_s,
-               CheckFindings* findings);
+               double tolerance_s, CheckFindings* findings);
 
 }  // namespace vcharge::internal

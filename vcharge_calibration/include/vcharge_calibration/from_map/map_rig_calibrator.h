@@ -44,7 +44,7 @@ class MapRigCalibrator : public DriveConsumer {
   /// Adds a keyframe from its features instead of its images; the distance to the last keyframe is not
   /// checked.
   void addKeyframe(Timestamp stamp, RigFeatures features, const RigidTransform& odom_from_vehicle,
-                   const VehicleRates& rates = VehicleRates());
+                   const FrameMotion& motion = FrameMotion());
 
   /// Calibrates from the drive so far. If the drive does not suffice, the verdict is kFail, with remarks why.
   /// The callback may be empty, and may throw to abandon the calibration.

@@ -52,6 +52,9 @@ class CameraRig {
   /// Relative standard deviation of the scale that all translations have in common, which comes from the
   /// wheels' size; 0 if it is unknown.
   double scale_sigma = 0.0;
+  /// Images whose stamps differ by at most this are one frame, each at its own time: for cameras that no
+  /// common trigger starts. 0: images of a frame have one stamp.
+  double stamp_tolerance_s = 0.0;
   /// How the rig was made, by keys such as `program`. For people only: nothing depends on it.
   std::map<std::string, std::string> provenance;
 

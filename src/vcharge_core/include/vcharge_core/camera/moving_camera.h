@@ -11,10 +11,12 @@ namespace vcharge {
 /// be any frame in which the vehicle's pose is given.
 class MovingCamera {
  public:
-  /// Pose and rates of the vehicle are those at the image's stamp. The camera must outlive this object.
-  MovingCamera(const RigCamera& camera, const RigidTransform& map_from_vehicle, const VehicleRates& rates);
+  /// Pose and motion of the vehicle are those at the frame's stamp. The camera must outlive this object.
+  MovingCamera(const RigCamera& camera, const RigidTransform& map_from_vehicle, const ImageMotion& motion);
 
-  /// Pose of the camera at the image's stamp.
+  /// Whether pixels may be exposed elsewhere than at the frame's stamp.
+  bool moves() const;
+  /// Pose of the camera at the frame's stamp.
   const RigidTransform& mapFromCamera() const { return map_from_camera_; }
   /// Pose of the camera when it exposed a pixel.
   RigidTransform poseAt(const Eigen::Vector2d& position_px) const;
@@ -24,7 +26,7 @@ class MovingCamera {
  private:
   const RigCamera& camera_;
   const RigidTransform map_from_vehicle_;
-  const VehicleRates rates_;
+  const ImageMotion motion_;
   const RigidTransform map_from_camera_, camera_from_map_;
 };
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "vcharge_core/motion/rigid_transform.h"
@@ -25,6 +28,21 @@ struct VehicleRates {
   Eigen::Vector3d velocityOf(const Eigen::Vector3d& point_m) const {
     return {forward_speed_m_per_s - yaw_rate_rad_per_s * point_m.y(), yaw_rate_rad_per_s * point_m.x(), 0.0};
   }
+};
+
+/// Motion of the vehicle around the stamp of a frame, for an image with a stamp of its own.
+struct ImageMotion {
+  VehicleRates rates;
+  double offset_s = 0.0;  ///< the image's stamp minus the frame's
+};
+
+/// Motion of the vehicle around the stamp of a frame.
+struct FrameMotion {
+  VehicleRates rates;
+  std::vector<double> image_offsets_s;  ///< per camera, see ImageMotion; empty: all stamps are the frame's
+
+  double offsetOf(size_t camera) const { return image_offsets_s.empty() ? 0.0 : image_offsets_s.at(camera); }
+  ImageMotion of(size_t camera) const { return {rates, offsetOf(camera)}; }
 };
 
 }  // namespace vcharge

@@ -23,6 +23,7 @@ struct TestDriveOptions {
   /// When the two cameras expose their images; the speed then differs from keyframe to keyframe. Empty: all
   /// pixels at the stamp.
   std::vector<ImageTiming> timings;
+  std::vector<double> image_offsets_s;  ///< of the two cameras' images, see ImageMotion
 };
 
 /// A drive along a circle among random points, with true poses, and exact (or noisy) observations of every
