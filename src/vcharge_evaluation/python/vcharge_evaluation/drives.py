@@ -64,6 +64,13 @@ def shutter_words(readout_ms):
             f"faults.rolling_shutter.readout_time_s={readout_ms / 1000}") if readout_ms else ()
 
 
+def trigger_words(shifts_ms):
+    """Words that let cameras expose after the others, by these times; none for {}."""
+    names, values = ", ".join(shifts_ms), ", ".join(f"{shift / 1000:g}" for shift in shifts_ms.values())
+    return ("--set", f"faults.image_stamp_shift.cameras=[{names}]", "--set", f"faults.image_stamp_shift.shifts_s=[{values}]",
+            "--set", "faults.image_stamp_shift.moves_exposure=true") if shifts_ms else ()
+
+
 def condition_words(condition):
     """Words that put a drive into a light and weather of CONDITIONS; none at noon."""
     return () if condition == "noon" else ("--set", f"condition.kind={condition}")

@@ -28,9 +28,10 @@ def write_heated_rig(rig_path, path, focal, shift_px):
     return truth
 
 
-def write_timed_rig(source, path, readout_s, direction):
-    """A rig file whose cameras have rolling shutters. Returns its path."""
+def write_timed_rig(source, path, readout_s, direction="down", stamp_tolerance_s=0.0):
+    """A rig file whose cameras have rolling shutters, or stamps of their own. Returns its path."""
     rig = yaml.safe_load(source.read_text())
+    rig["stamp_tolerance_s"] = stamp_tolerance_s
     for camera in rig["cameras"].values():
         camera.update(readout_s=readout_s, readout_direction=direction)
     path.write_text(yaml.safe_dump(rig, sort_keys=False))
