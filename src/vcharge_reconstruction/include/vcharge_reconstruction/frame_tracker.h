@@ -64,8 +64,7 @@ class CameraTracker {
 
   /// Tracks all points into the next image; predicts them for a vehicle that moved by
   /// `previous_from_current` and moves as `motion` says now. Appends a match per tracked point, with
-  /// `camera_index` as camera; its rays begin where the camera was at their exposure. An empty image ends all
-  /// tracks.
+  /// `camera_index` as camera; its rays begin at the camera. An empty image ends all tracks.
   void track(const Image& image, const RigidTransform& previous_from_current, const ImageMotion& motion,
              int camera_index, std::vector<RayMatch>* matches);
 
@@ -88,7 +87,13 @@ class CameraTracker {
   /// unchanged, if it cannot be, or if that is its anchor.
   bool alignWithLastKeyframe(LiveTrack* track) const;
   bool isMasked(const Eigen::Vector2d& position_px) const;
-  Ray rayOf(const LiveTrack& track, const ImageMotion& motion) const;
+  double exposedAt(const LiveTrack& track, const ImageMotion& motion) const;
+  /// Rays of a track in two images. Of a vehicle at constant rates all lines see the same motion, each at its
+  /// own time: what counts is by how much later or earlier the line of the second image was exposed. That is
+  /// little and along the path, where it changes no epipolar plane, so only the turn is corrected. Where it
+  /// begins along the path would tell the length of the motion, but that is the odometer's.
+  RayMatch matchOf(const LiveTrack& previous, const ImageMotion& previous_motion, const LiveTrack& current,
+                   const ImageMotion& motion) const;
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;
 
   const RigCamera& camera_;

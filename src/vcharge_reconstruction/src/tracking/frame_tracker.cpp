@@ -8,7 +8,6 @@
 #include <set>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_reconstruction/exposed_ray.h"
 
 namespace vcharge {
 namespace {
@@ -119,10 +118,22 @@ CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions&
       mask_(makeFeatureMask(camera)),
       spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {}
 
-Ray CameraTracker::rayOf(const LiveTrack& track, const ImageMotion& motion) const {
-  return camera_.vehicle_from_camera
-             ? rayInVehicle(camera_, track.ray_in_camera, {track.position_px.x, track.position_px.y}, motion)
-             : Ray{Eigen::Vector3d::Zero(), track.ray_in_camera};
+double CameraTracker::exposedAt(const LiveTrack& track, const ImageMotion& motion) const {
+  return motion.offset_s + camera_.exposedAt({track.position_px.x, track.position_px.y});
+}
+
+RayMatch CameraTracker::matchOf(const LiveTrack& previous, const ImageMotion& previous_motion,
+                                const LiveTrack& current, const ImageMotion& motion) const {
+  RayMatch match;
+  const RigidTransform vehicle_from_camera = camera_.vehicle_from_camera.value_or(RigidTransform());
+  match.previous = {vehicle_from_camera.translation(),
+                    vehicle_from_camera.rotation() * previous.ray_in_camera};
+  match.current = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * current.ray_in_camera};
+  const double later_s = exposedAt(current, motion) - exposedAt(previous, previous_motion);
+  if (later_s != 0.0) {
+    match.current.direction = motion.rates.motionAfter(later_s).rotation() * match.current.direction;
+  }
+  return match;
 }
 
 cv::Point2f CameraTracker::predict(const LiveTrack& track,
@@ -172,9 +183,7 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
                                    &next.ray_in_camera)) {
         continue;
       }
-      RayMatch match;
-      match.previous = rayOf(tracks_[i], previous_motion);
-      match.current = rayOf(next, motion);
+      RayMatch match = matchOf(tracks_[i], previous_motion, next, motion);
       match.previous_camera = match.current_camera = camera_index;
       matches->push_back(match);
       kept.push_back(next);

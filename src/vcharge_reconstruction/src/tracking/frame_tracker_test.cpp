@@ -156,5 +156,46 @@ TEST(FrameTrackerTest, EndsAllTracksWhereAnImageIsMissing) {
   }
 }
 
+/// Current directions of the matches of a camera with extrinsics, between two images in which points move 8
+/// pixels to the right.
+std::vector<RayMatch> matchesOf(const ImageTiming& timing, double yaw_rate_rad_per_s, double image_offset_s) {
+  RigCamera camera = makeCamera();
+  camera.vehicle_from_camera = RigidTransform();
+  camera.timing = timing;
+  const FrameTrackerOptions options;
+  const auto extractor = makeFeatureExtractor();
+  const cv::Mat wall = makeWall();
+  CameraTracker tracker(camera, options);
+  const ImageMotion motion{{2.0, yaw_rate_rad_per_s}, image_offset_s};
+  std::vector<RayMatch> matches;
+  ReconstructionData data;
+  data.keyframes.resize(1);
+  data.keyframes[0].images.resize(1);
+  tracker.track(look(wall, 1.0, 0.0), RigidTransform(), motion, 0, &matches);
+  tracker.readKeyframe(0, *extractor, &data.keyframes[0].images[0]);
+  tracker.addKeyframe(0, 0, &data);
+  tracker.track(look(wall, 1.0, 8.0), RigidTransform(), motion, 0, &matches);
+  return matches;
+}
+
+TEST(FrameTrackerTest, MatchesKnowHowMuchLaterALineIsExposed) {
+  const std::vector<RayMatch> at_once = matchesOf(ImageTiming(), 0.5, 0.0);
+  // Points move along the lines' order by 8 of 400 columns, or across it.
+  const std::vector<RayMatch> along = matchesOf({0.02, ReadoutDirection::kRight, 0.0}, 0.5, 0.0);
+  const std::vector<RayMatch> across = matchesOf({0.02, ReadoutDirection::kDown, 0.0}, 0.5, 0.03);
+  ASSERT_GT(at_once.size(), 50U);
+  ASSERT_EQ(along.size(), at_once.size());
+  ASSERT_EQ(across.size(), at_once.size());
+  constexpr double kTurn_rad = 0.5 * 0.02 * 8.0 / kSide_px;
+  for (size_t i = 0; i < at_once.size(); ++i) {
+    const Eigen::Vector3d turned =
+        rotationFromYawPitchRoll(kTurn_rad, 0.0, 0.0) * at_once[i].current.direction;
+    EXPECT_LT((along[i].current.direction - turned).norm(), 0.2 * kTurn_rad);
+    EXPECT_LT((across[i].current.direction - at_once[i].current.direction).norm(), 0.2 * kTurn_rad);
+    EXPECT_EQ(along[i].previous.direction, at_once[i].previous.direction);
+    EXPECT_TRUE(along[i].current.origin_m.isZero(0.0));
+  }
+}
+
 }  // namespace
 }  // namespace vcharge
