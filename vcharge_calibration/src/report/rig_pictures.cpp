@@ -137,9 +137,10 @@ std::vector<CornerError> meanErrors(cv::Size image_size_px, const std::vector<Co
   std::vector<CornerError> means;
   for (size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].count >= kMinPerCell) {
-      means.push_back({{width * (static_cast<double>(i % kColumns) + 0.5),
-                        height * (static_cast<double>(i / kColumns) + 0.5)},
-                       cells[i].sum_px / cells[i].count});
+      const size_t column = i % kColumns, row = i / kColumns;
+      means.push_back(
+          {{width * (static_cast<double>(column) + 0.5), height * (static_cast<double>(row) + 0.5)},
+           cells[i].sum_px / cells[i].count});
     }
   }
   return means;

@@ -268,6 +268,9 @@ TEST_F(DriveCheckerTest, FindsStampsThatDifferAndImagesThatAreLost) {
     return true;
   };
   EXPECT_EQ(notPassed(check(drive)), "FAIL sync");
+  drive.rig.stamp_tolerance_s = 0.01;
+  EXPECT_EQ(notPassed(check(drive)), "");
+  drive.rig.stamp_tolerance_s = 0.0;
 
   drive.change_image = [](size_t camera, int frame, Timestamp*, cv::Mat*) {
     return camera == 0 || frame % 15 != 3;
