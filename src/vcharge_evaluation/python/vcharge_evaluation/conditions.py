@@ -6,7 +6,7 @@ from vcharge_evaluation.drawing.moments import OBSTACLE_LEGEND, draw_obstacles
 from vcharge_evaluation.drives import SCENARIOS, Drive, found_masks, scenario_drive, scene_and_drive
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.obstacles import judge_obstacles, summary
-from vcharge_evaluation.ranges import RangeErrors
+from vcharge_evaluation.ranges import AS_ON_THE_CAR, RangeErrors
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, NoResult, run_tool_once, say
 
@@ -101,8 +101,7 @@ class Condition:
     def range_figures(self):
         known, right, spread = 0.0, 0.0, {"percentile_50": RANGE_BOUND, "percentile_95": RANGE_BOUND}
         try:
-            judged = RangeErrors(self.drive, self.masks, "online_ranges", "--online", "--options",
-                                 CONFIG / "dense_obstacles.yaml").sets["all cameras"]
+            judged = RangeErrors(self.drive, self.rig, "online_ranges", *AS_ON_THE_CAR).sets["all cameras"]
             known, spread = percent(judged["num_known"], judged["num_judged"]), judged["bounded_relative_error"]
             right = next(100 * one["fraction_within_tolerance"] for one in judged["accuracy"] if abs(one["density"] - 0.6) < 1e-6)
             self.range_words = ("--range", self.drive.folder / "online_ranges")

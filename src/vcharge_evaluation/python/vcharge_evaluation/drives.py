@@ -30,12 +30,12 @@ class Drive:
         self.bag, self.truth = self.folder / "drive.bag", self.folder / "drive_truth"
         self.trajectory, self.true_rig = self.truth / "trajectory.tum", self.folder / "rig_truth.yaml"
 
-    def map(self, rig):
+    def map(self, rig, name="map"):
         """Sparse map and trajectory of build_map with a rig file, and its run, which may have failed."""
-        run = run_tool_once("build_map", self.folder / "map.log", "--bag", self.bag, "--rig", rig, "--output",
-                            self.folder / "map.vmap", "--trajectory", self.folder / "map.tum", "--options",
-                            CONFIG / "mapping.yaml", may_fail=True)
-        return self.folder / "map.vmap", self.folder / "map.tum", run
+        path, trajectory = self.folder / f"{name}.vmap", self.folder / f"{name}.tum"
+        run = run_tool_once("build_map", self.folder / f"{name}.log", "--bag", self.bag, "--rig", rig, "--output", path,
+                            "--trajectory", trajectory, "--options", CONFIG / "mapping.yaml", may_fail=True)
+        return path, trajectory, run
 
 
 def loop_drive(work, scene, seed, scale, duration_s=LOOP_S, words=()):

@@ -69,12 +69,13 @@ def detect_obstacles(drive, rig, output, *words):
     return run.found["num_maps"]
 
 
-def judge_obstacles(drive, rig, *words):
-    """Errors of the obstacle maps of a drive with a rig file. NoResult if there are no maps."""
-    output = drive.folder / "obstacles"
+def judge_obstacles(drive, rig, *words, name="obstacles", sound=None):
+    """Errors of the obstacle maps of a drive with a rig file; `sound` is a drive with the truth, if not this one. NoResult if
+    there are no maps."""
+    output = drive.folder / name
     if detect_obstacles(drive, rig, output, *words) == 0:
         raise NoResult("no obstacle map could be made")
-    return judge("obstacles", drive.folder / "report", "--obstacles", output, "--truth", drive.truth)
+    return judge("obstacles", drive.folder / f"{name}_report", "--obstacles", output, "--truth", (sound or drive).truth)
 
 
 def summary(errors):

@@ -9,6 +9,7 @@ from vcharge_evaluation.results import Figure, Results, add_arguments, calibrati
 from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once, say
 
 DENSITIES = (0.4, 0.6, 0.8)
+AS_ON_THE_CAR = ("--online", "--options", CONFIG / "dense_obstacles.yaml")
 TRUE_POSES = {
               "pose_noise": {"scale": 0.0, "translation_m": 0.001, "translation_m_per_sqrt_m": 0.0, "rotation_rad": 0.0002,
                              "rotation_rad_per_sqrt_m": 0.0}}
@@ -35,17 +36,18 @@ def arguments():
 
 
 class RangeErrors:
-    """Range maps of a drive, made with the masks that make_masks found, and their errors, by camera and over "all cameras"."""
+    """Range maps of a drive with a rig file, and their errors, by camera and over "all cameras"; `sound` is a drive with the
+    true ranges, if not this one."""
 
-    def __init__(self, drive, masks, name, *words):
-        self.drive, self.output = drive, drive.folder / name
+    def __init__(self, drive, rig, name, *words, sound=None):
+        self.drive, self.output, sound = drive, drive.folder / name, sound or drive
         say(f"{drive.folder}: {name}")
         self.run = run_tool_once("compute_range_maps", drive.folder / f"{name}.log", "--bag", drive.bag, "--rig",
-                                 masks.rig_of(drive.folder), "--output", self.output, "--no-pictures", *words, may_fail=True)
+                                 rig, "--output", self.output, "--no-pictures", *words, may_fail=True)
         if self.run.error():
             raise NoResult(self.run.reason())
-        errors = judge("range", drive.folder / f"{name}_report", "--range", self.output, "--truth", drive.truth, "--bag",
-                       drive.bag, "--rig", drive.true_rig)
+        errors = judge("range", drive.folder / f"{name}_report", "--range", self.output, "--truth", sound.truth, "--bag",
+                       sound.bag, "--rig", sound.true_rig)
         self.sets = {one["label"]: one for one in errors["sets"]}
 
     def figures(self, label="all cameras"):
@@ -91,7 +93,8 @@ def evaluate_other_day(args, results):
     for drive in args.drives:
         scene, seed = drive.split(":")
         masks = found_masks(args.work, scene)
-        errors = RangeErrors(other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s), masks, "ranges")
+        made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
+        errors = RangeErrors(made, masks.rig_of(made.folder), "ranges")
         size = f"image scale {args.image_scale:g}"
         results.add(f"By camera, {size}", *((f"{scene} {seed}, {label}", [
             figure("pixels with a range", percent(one["num_known"], one["num_judged"]), "%", at_least=70),
@@ -112,8 +115,7 @@ def evaluate_online(args, results):
     for drive in args.drives:
         scene, seed = drive.split(":")
         made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
-        errors = RangeErrors(made, found_masks(args.work, scene), "online", "--online", "--options",
-                             CONFIG / "dense_obstacles.yaml")
+        errors = RangeErrors(made, found_masks(args.work, scene).rig_of(made.folder), "online", *AS_ON_THE_CAR)
         results.add(f"On the car, image scale {args.image_scale:g}",
                     *((f"{scene} {seed}, {label}", [*errors.figures(label), *errors.near_figures(label)])
                       for label in errors.sets if label != "all cameras"))
@@ -121,8 +123,9 @@ def evaluate_online(args, results):
 
 def evaluate_drive(args, results):
     drive, masks = Drive(args.work, "short", "--scene", "lot", "--drive", "short", "--truth-range"), found_masks(args.work, "lot")
-    odometry = RangeErrors(drive, masks, "odometry")
-    true = RangeErrors(drive, masks, "truth", "--cameras", "front", "left", "--trajectory", drive.trajectory)
+    rig = masks.rig_of(drive.folder)
+    odometry = RangeErrors(drive, rig, "odometry")
+    true = RangeErrors(drive, rig, "truth", "--cameras", "front", "left", "--trajectory", drive.trajectory)
     results.add("Range maps of a simulated lot", *((f"{poses}, {label}", errors.figures(label)) for poses, errors in
                                                    (("odometry", odometry), ("true poses, refined", true))
                                                    for label in errors.sets))
@@ -143,7 +146,7 @@ def evaluate_settings(args, results):
             options = made.folder / f"{name}.yaml"
             options.write_text(yaml.safe_dump({"plane_sweep": {**overrides, **(TRUE_POSES if true_poses else {})}}))
             poses = ["--trajectory", made.trajectory] if true_poses else []
-            errors = RangeErrors(made, masks, name, "--preset", preset, "--options", options, *poses)
+            errors = RangeErrors(made, masks.rig_of(made.folder), name, "--preset", preset, "--options", options, *poses)
             columns.append((setting, [*errors.figures(), Figure("processor time per range map", errors.processor_ms(),
                                                                 "ms")]))
             if setting == "default":

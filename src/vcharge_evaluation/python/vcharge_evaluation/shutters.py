@@ -7,7 +7,8 @@ import numpy as np
 
 from vcharge_evaluation.drives import found_masks, loop_drive, other_day_drive, shutter_words, trigger_words
 from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
-from vcharge_evaluation.obstacles import detect_obstacles, summary
+from vcharge_evaluation.obstacles import judge_obstacles, summary
+from vcharge_evaluation.ranges import AS_ON_THE_CAR, RangeErrors
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.spoiled_drives import write_timed_rig
 from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once, say
@@ -52,6 +53,11 @@ def quantiles(name, errors, unit):
     return [(f"{name}, {label}", float(np.percentile(errors, which)), unit) for label, which in (("median", 50), ("95 %", 95))]
 
 
+def name_of(stage, told):
+    """Name of the files that a stage makes of a drive."""
+    return f"{stage}_{'untimed' if told == AT_ONCE else 'timed'}"
+
+
 class Place:
     """A scene's drives by timing, and what they are judged by: the drives that are exposed at once."""
 
@@ -75,10 +81,7 @@ class Place:
 
     def trajectory(self, timing, told, name):
         drive = self.loop(timing)
-        trajectory = drive.folder / f"{name}.tum"
-        run = run_tool_once("build_map", drive.folder / f"{name}.log", "--bag", drive.bag, "--rig", self.rig(drive, told),
-                            "--output", drive.folder / f"{name}.vmap", "--trajectory", trajectory, "--options",
-                            CONFIG / "mapping.yaml", may_fail=True)
+        _, trajectory, run = drive.map(self.rig(drive, told), name)
         if run.error():
             raise NoResult(run.reason())
         errors = judge("trajectory", drive.folder / f"{name}_report", "--estimate", trajectory, "--truth", drive.trajectory)
@@ -90,7 +93,7 @@ class Place:
     def localization(self, timing, told, name):
         """In the map of the loop that is exposed at once."""
         mapping = self.loop(AT_ONCE)
-        path, _, run = mapping.map(self.masks.rig_of(mapping.folder))
+        path, _, run = mapping.map(self.rig(mapping, AT_ONCE), name_of("trajectory", AT_ONCE))
         if run.error():
             raise NoResult(run.reason())
         drive = self.other(timing)
@@ -103,26 +106,15 @@ class Place:
     def ranges(self, timing, told, name):
         if timing.shifts_ms and told == AT_ONCE:
             raise NoResult("its stamps have no true ranges")
-        drive, sound = self.other(timing), self.other(AT_ONCE)
-        output = drive.folder / name
-        run = run_tool_once("compute_range_maps", output.with_suffix(".log"), "--bag", drive.bag, "--rig",
-                            self.rig(drive, told), "--output", output, "--no-pictures", "--online", "--options",
-                            CONFIG / "dense_obstacles.yaml", may_fail=True)
-        if run.error():
-            raise NoResult(run.reason())
-        errors = judge("range", drive.folder / f"{name}_report", "--range", output, "--truth", sound.truth, "--bag", sound.bag,
-                       "--rig", sound.true_rig)
-        spread = next(one for one in errors["sets"] if one["label"] == "all cameras")["bounded_relative_error"]
+        drive = self.other(timing)
+        errors = RangeErrors(drive, self.rig(drive, told), name, *AS_ON_THE_CAR, sound=self.other(AT_ONCE))
+        spread = errors.sets["all cameras"]["bounded_relative_error"]
         yield "error over the range (unknown: 50 %), mean", 100 * spread["mean"], "%"
         yield "error over the range, median", 100 * spread["percentile_50"], "%"
 
     def obstacles(self, timing, told, name):
-        drive, sound = self.other(timing), self.other(AT_ONCE)
-        output = drive.folder / name
-        if detect_obstacles(drive, self.rig(drive, told), output) == 0:
-            raise NoResult("no obstacle map could be made")
-        report = drive.folder / f"{name}_report"
-        errors = summary(judge("obstacles", report, "--obstacles", output, "--truth", sound.truth))
+        drive = self.other(timing)
+        errors = summary(judge_obstacles(drive, self.rig(drive, told), name=name, sound=self.other(AT_ONCE)))
         yield "distance of the nearest obstacle (missed: 50 cm), mean error", 100 * errors["mean_m"], "cm"
 
 
@@ -132,8 +124,7 @@ def compare(place, stage, timing):
     for kind, of_drive, told in (("at once", AT_ONCE, AT_ONCE), ("told", timing, timing), ("not told", timing, AT_ONCE)):
         say(f"{stage}, {timing.name}, {kind}")
         try:
-            name = f"{stage}_{'untimed' if told == AT_ONCE else 'timed'}"
-            found[kind] = list(getattr(place, stage)(of_drive, told, name))
+            found[kind] = list(getattr(place, stage)(of_drive, told, name_of(stage, told)))
         except NoResult as error:
             yield Figure(f"{stage}: {kind}", str(error))
         except RuntimeError:  # a judge finds no truth at the stamps
