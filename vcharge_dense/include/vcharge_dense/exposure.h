@@ -9,9 +9,15 @@
 
 namespace vcharge {
 
+/// Image point of a pixel of a camera without distortion: (x, y) / (z + xi) of its unit ray.
+inline Eigen::Vector2d imagePoint(const MeiCamera& camera, const Eigen::Vector2d& position_px) {
+  return {(position_px.x() - camera.u0()) / camera.gamma1(),
+          (position_px.y() - camera.v0()) / camera.gamma2()};
+}
+
 /// When a camera without distortion exposes a pixel, after the image's or frame's stamp: c0 + m (c1 + c2 r^2
-/// + c3 r^4), where (x, y) / (z + xi) is the image point of a unit ray, r its length, and m its coordinate
-/// across the lines. The two higher terms are the distortion of the sensor, whose lines are read out.
+/// + c3 r^4), where r is the length of the image point, and m its coordinate across the lines. The two higher
+/// terms are the distortion of the sensor, whose lines are read out.
 struct ExposureTimes {
   bool lines_are_columns = false;
   Eigen::Vector4d coefficients_s = Eigen::Vector4d::Zero();

@@ -1,6 +1,5 @@
 #include "vcharge_dense/exposure.h"
 
-#include <cmath>
 #include <vector>
 
 #include <Eigen/QR>
@@ -20,7 +19,6 @@ ExposureTimes ExposureTimes::of(const RigCamera& camera, const WorkingCamera& wo
   if (camera.timing.readout_s == 0.0) {
     return times;
   }
-  const MeiCamera& model = working.model();
   std::vector<Eigen::Vector4d> terms;
   std::vector<double> exposed_s;
   for (int y = 0; y < working.size().height; y += kStep_px) {
@@ -29,7 +27,7 @@ ExposureTimes ExposureTimes::of(const RigCamera& camera, const WorkingCamera& wo
       if (sensor_px[0] < 0.0F) {
         continue;
       }
-      const Eigen::Vector2d point((x - model.u0()) / model.gamma1(), (y - model.v0()) / model.gamma2());
+      const Eigen::Vector2d point = imagePoint(working.model(), Eigen::Vector2d(x, y));
       const double across = point[times.lines_are_columns ? 0 : 1], squared = point.squaredNorm();
       terms.emplace_back(1.0, across, across * squared, across * squared * squared);
       exposed_s.push_back(camera.exposedAt({sensor_px[0], sensor_px[1]}));

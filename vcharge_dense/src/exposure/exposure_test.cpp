@@ -70,8 +70,7 @@ TEST(ExposureTest, TimesAreThoseOfTheSensorsLines) {
         for (int x = 0; x < kSize.width; ++x) {
           const cv::Vec2f& sensor_px = working.sensorPixels().at<cv::Vec2f>(y, x);
           if (sensor_px[0] >= 0.0F) {
-            const Eigen::Vector2d point((x - working.model().u0()) / working.model().gamma1(),
-                                        (y - working.model().v0()) / working.model().gamma2());
+            const Eigen::Vector2d point = imagePoint(working.model(), Eigen::Vector2d(x, y));
             worst_s =
                 std::max(worst_s, std::abs(times.at(point) - camera.exposedAt({sensor_px[0], sensor_px[1]})));
           }
@@ -112,7 +111,8 @@ TEST(ExposureTest, KernelsProjectBetweenLinesOfTwoCameras) {
   AlignedArray<float> x, y, z, base, weight, u, v;
   std::vector<Eigen::Vector2d> expected;
   for (int i = 0; i < 512; ++i) {
-    const Eigen::Vector2d pixel(160.0 + (i % 16) * 9.0, 20.0 + (i / 16) * 5.0);
+    const int column = i % 16, row = i / 16;
+    const Eigen::Vector2d pixel(160.0 + column * 9.0, 20.0 + row * 5.0);
     const double inverse_range = 0.05 + 0.05 * (i % 7);
     Eigen::Vector3d ray;
     ASSERT_TRUE(kCamera.unproject(pixel, &ray));

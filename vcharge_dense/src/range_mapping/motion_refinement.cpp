@@ -174,10 +174,8 @@ class MotionRefinement::FollowedCamera {
   }
   /// What the last image shows at a position.
   Sight sightOf(const cv::Point2f& position_px, const Eigen::Vector3d& ray_in_camera) const {
-    const MeiCamera& model = camera_.model;
     const double time_s =
-        motion_.offset_s + camera_.times.at({(position_px.x - model.u0()) / model.gamma1(),
-                                             (position_px.y - model.v0()) / model.gamma2()});
+        motion_.offset_s + camera_.times.at(imagePoint(camera_.model, {position_px.x, position_px.y}));
     const RigidTransform& camera = camera_.vehicle_from_camera;
     const Sight at_exposure{camera.rotation() * ray_in_camera.normalized(), camera.translation()};
     if (time_s == 0.0) {

@@ -18,17 +18,6 @@ TEST(VehicleRatesTest, ConstantSpeedAndTurnRateFollowAnArc) {
             1e-12);
 }
 
-TEST(VehicleRatesTest, RatesOfAMotionGiveTheMotion) {
-  for (const double yaw_rate : {-0.7, 0.0, 1e-9, 0.4}) {
-    for (const double speed : {-1.5, 0.0, 4.0}) {
-      const VehicleRates rates{speed, yaw_rate};
-      const VehicleRates found = VehicleRates::between(rates.motionAfter(0.08), 0.08);
-      EXPECT_NEAR(found.forward_speed_m_per_s, speed, 1e-9);
-      EXPECT_NEAR(found.yaw_rate_rad_per_s, yaw_rate, 1e-9);
-    }
-  }
-}
-
 TEST(VehicleRatesTest, VelocityIsTheDerivativeOfTheMotion) {
   const VehicleRates rates{2.0, -0.6};
   const Eigen::Vector3d point_m(1.0, 2.0, 0.5);

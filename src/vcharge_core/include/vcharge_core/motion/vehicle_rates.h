@@ -18,8 +18,6 @@ struct VehicleRates {
   double forward_speed_m_per_s = 0.0;
   double yaw_rate_rad_per_s = 0.0;
 
-  /// The rates of the motion from one pose to another in `time_s`.
-  static VehicleRates between(const RigidTransform& before_from_after, double time_s);
   /// Pose of the vehicle a time after the instant, in its frame at the instant.
   RigidTransform motionAfter(double time_s) const {
     return arcMotion(forward_speed_m_per_s * time_s, yaw_rate_rad_per_s * time_s);
