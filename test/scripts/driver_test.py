@@ -105,14 +105,14 @@ class DriverTest(unittest.TestCase):
         self.unload()
         rospy.delete_param("/driver")
 
-    def plug(self, device):
-        (self.folder / "new").write_text(EMULATED)
+    def plug(self, device, config=EMULATED):
+        (self.folder / "new").write_text(config)
         (self.folder / "new").rename(device)
 
-    def load(self, **options):
+    def load(self, rig=None, **options):
         defaults = {"devices": [str(device) for device in self.devices],
                     "v4l2": {"capture": {"frame_rate_hz": RATE_HZ}, "reconnect_s": 0.2, "timeout_s": 5.0}}
-        rospy.set_param("/driver", {"rig": str(self.rig), "options": {**defaults, **options}})
+        rospy.set_param("/driver", {"rig": str(rig or self.rig), "options": {**defaults, **options}})
         for store in (*self.images.values(), *self.infos.values(), self.odometry, self.transforms, self.diagnostics):
             store.clear()
         try:
@@ -161,6 +161,24 @@ class DriverTest(unittest.TestCase):
         self.assertGreater(at[stamps[-1]].pose.covariance[0], 0.0)
         self.assertEqual(set(self.statics), {f"camera_{camera}_optical" for camera in CAMERAS})
         wait_for(lambda: all(self.level(name) == 0 for name in (*CAMERAS, "sync", "odometry")), "good diagnostics")
+
+    def test_cameras_without_a_common_trigger_keep_their_stamps(self):
+        rig = self.folder / "free_running.yaml"
+        rig.write_text(yaml.safe_dump({**yaml.safe_load(self.rig.read_text()), "stamp_tolerance_s": 0.03}))
+        for i, device in enumerate(self.devices):
+            self.plug(device, EMULATED + f"exposure_us={5000 + 9000 * i}\nreadout_us=40000\n")
+        self.assertTrue(self.load(rig))
+        wait_for(lambda: all(len(self.images[camera]) >= 20 for camera in CAMERAS), "images of all cameras")
+        stamps = {camera: {pulse_in(image): stamp.to_sec() for stamp, image in list(self.images[camera].items())}
+                  for camera in CAMERAS}
+        for i, camera in enumerate(CAMERAS):
+            later = [stamps[camera][pulse] - stamps["front"][pulse] for pulse in set(stamps[camera]) & set(stamps["front"])]
+            self.assertLess(max(abs(each - 0.009 * i) for each in later), 0.005)  # twice the jitter
+        told = {message.header.stamp for message in list(self.odometry)}
+        for camera in CAMERAS:
+            self.assertGreater(len(told & set(self.images[camera])), 10, f"odometry at the stamps of {camera}")
+        wait_for(lambda: all(self.level(name) == 0 for name in CAMERAS), "good diagnostics")
+        self.assertNotIn("sync", self.diagnostics)
 
     def test_nodelets_of_the_manager_share_the_drivers_images(self):
         """Depth, localization and obstacles receive the driver's own buffer: its address is the same for all."""

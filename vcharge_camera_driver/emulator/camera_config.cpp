@@ -25,6 +25,7 @@ CameraConfig readCameraConfig(const std::string& path) {
     if (key == "short_every") config.short_every = static_cast<uint64_t>(number());
     if (key == "silent_after") config.silent_after = static_cast<uint64_t>(number());
     if (key == "unknown_clock") config.unknown_clock = number() != 0;
+    if (key == "stamps_start") config.stamps_start = number() != 0;
     if (key == "fail") {
       const size_t colon = value.find(':');
       config.failures[value.substr(0, colon)] = std::stoi(value.substr(colon + 1));

@@ -22,6 +22,7 @@ struct CameraConfig {
   uint64_t silent_after = 0;                    ///< stops after this number of frames; 0: never
   std::map<std::string, int> failures;          ///< errno of failing ioctls, by name: fail=STREAMON:5
   bool unknown_clock = false;
+  bool stamps_start = false;  ///< stamps are flagged as those of the start of the exposure
 };
 
 /// Reads the file that represents the device node: lines "key=value".

@@ -316,6 +316,7 @@ void EmulatedCamera::deliver(uint64_t pulse) {
   queued_.pop_front();
   done.sequence = static_cast<uint32_t>(number);
   done.flags = config_.unknown_clock ? V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN : V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  done.flags |= config_.stamps_start ? V4L2_BUF_FLAG_TSTAMP_SRC_SOE : V4L2_BUF_FLAG_TSTAMP_SRC_EOF;
   done.flags |= isHit(config_.damage_every) ? V4L2_BUF_FLAG_ERROR : 0U;
   done.stamp_ns = static_cast<int64_t>(pulse) * period() +
                   1000 * (config_.exposure_us + jitterOf(pulse, path_, config_.jitter_us));

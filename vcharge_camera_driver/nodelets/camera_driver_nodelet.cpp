@@ -1,7 +1,6 @@
 #include <memory>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include <tf2_ros/static_transform_broadcaster.h>
@@ -18,9 +17,10 @@
 
 namespace vcharge {
 
-/// Publishes cameras and wheels of a car: /camera/<name>/{image_raw,camera_info} (mono8; a stamp per pulse),
-/// /odom, odom -> base_link, cameras on /tf_static, /diagnostics. Parameters: ~rig (path), ~options
-/// (DriverOptions). Cameras and bus may be unplugged and plugged in again; options and rig must be valid.
+/// Publishes cameras and wheels of a car: /camera/<name>/{image_raw,camera_info} (mono8; a stamp per pulse of
+/// a common trigger, else per image), /odom, odom -> base_link, cameras on /tf_static, /diagnostics.
+/// Parameters: ~rig (path), ~options (DriverOptions). Cameras and bus may come and go; options and rig must
+/// be valid.
 class CameraDriverNodelet : public Nodelet {
  public:
   CameraDriverNodelet() : Nodelet("camera_driver", Threads::kSeveral) {}
@@ -43,7 +43,7 @@ class CameraDriverNodelet : public Nodelet {
     options_ = completeOptions(options, *rig_, privateNode().resolveName("options"));
     const double rate_hz = options_.v4l2.capture.frame_rate_hz;
     sink_ = std::make_unique<MessageSink>(options_.cameras.size(), TriggerGrouperOptions{rate_hz},
-                                          options_.stamp_offset_s,
+                                          rig_->stamp_tolerance_s == 0.0, options_.stamp_offset_s,
                                           [this](const MultiFrame& group) { publish(group); });
     source_ = makeFrameSource(options_, rig_, now, [this](const WheelTicks& ticks) { addWheels(ticks); });
     // All checks that may throw come before this: topics that appear and vanish at once confuse subscribers.
@@ -61,10 +61,9 @@ class CameraDriverNodelet : public Nodelet {
           "/can", [this] { return reportCan(can_->status()); }, Threads::kSeveral);
       threads_.emplace_back([this] { can_->run([this](const auto& wheels) { addWheels(wheels); }); });
     } else if (odometry_ && options_.source != FrameSourceKind::kBag) {
-      subscribe<vcharge_msgs::WheelTicks>(topics_.wheel_ticks, 100,
-                                          [this](const vcharge_msgs::WheelTicksConstPtr& message) {
-                                            addWheels(fromMessage(*message, topics_.wheel_ticks));
-                                          });
+      subscribe<vcharge_msgs::WheelTicks>(topics_.wheel_ticks, 100, [this](const auto& message) {
+        addWheels(fromMessage(*message, topics_.wheel_ticks));
+      });
     }
     threads_.emplace_back([this] { guard().run([this] { source_->run(sink_.get()); }); });
   }
@@ -87,15 +86,16 @@ class CameraDriverNodelet : public Nodelet {
   void addStatuses() {
     for (size_t i = 0; i < options_.cameras.size(); ++i) {
       const auto report = [this, i] {
-        return reportCamera(options_.cameras[i], source_->status().at(i), sink_->counts().cameras.at(i));
+        return reportCamera(options_.cameras[i], source_->status().at(i), sink_->countsOf(i));
       };
       addDiagnostics("/" + options_.cameras[i], report, Threads::kSeveral);
     }
-    const auto report_sync = [this, before = TriggerGrouperCounts()]() mutable {
-      const TriggerGrouperCounts counts = sink_->counts();
-      return reportSync(counts, std::exchange(before, counts));
-    };
-    addDiagnostics("/sync", report_sync, Threads::kSeveral);
+    if (rig_->stamp_tolerance_s == 0.0) {
+      const auto report = [this, before = TriggerGrouperCounts()]() mutable {
+        return reportSync(sink_->counts(), &before);
+      };
+      addDiagnostics("/sync", report, Threads::kSeveral);
+    }
     if (odometry_) {
       addDiagnostics(
           "/odometry", [this] { return odometry_->report(); }, Threads::kSeveral);

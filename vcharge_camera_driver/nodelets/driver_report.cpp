@@ -14,9 +14,9 @@ std::string milliseconds(double seconds) {
 }  // namespace
 
 DriveMonitor::Report reportCamera(const std::string& name, const CameraStatus& status,
-                                  const TriggerCameraCounts& counts) {
+                                  const std::optional<TriggerCameraCounts>& counts) {
   DriveMonitor::Report report;
-  const bool waits_for_alignment = status.streaming && !counts.aligned;
+  const bool waits_for_alignment = status.streaming && counts && !counts->aligned;
   report.level = !status.streaming     ? DriveMonitor::Level::kError
                  : waits_for_alignment ? DriveMonitor::Level::kWarn
                                        : DriveMonitor::Level::kOk;
@@ -28,19 +28,27 @@ DriveMonitor::Report reportCamera(const std::string& name, const CameraStatus& s
   add("damaged", status.damaged, &report);
   add("timeouts", status.timeouts, &report);
   add("connections", status.connections, &report);
-  add("slips", counts.slips, &report);
-  add("unaligned", counts.unaligned, &report);
-  add("missing in groups", counts.missing, &report);
+  if (status.exposure_s) {
+    report.values.emplace_back("exposure", milliseconds(*status.exposure_s));
+  }
+  if (status.rate_hz) {
+    report.values.emplace_back("frames per second", std::to_string(*status.rate_hz));
+  }
+  if (counts) {
+    add("slips", counts->slips, &report);
+    add("unaligned", counts->unaligned, &report);
+    add("missing in groups", counts->missing, &report);
+  }
   return report;
 }
 
-DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, const TriggerGrouperCounts& before) {
+DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, TriggerGrouperCounts* before) {
   DriveMonitor::Report report;
-  const uint64_t complete = now.complete - before.complete;
-  const uint64_t incomplete = now.incomplete - before.incomplete;
+  const uint64_t complete = now.complete - before->complete;
+  const uint64_t incomplete = now.incomplete - before->incomplete;
   uint64_t slips = 0;
   for (size_t i = 0; i < now.cameras.size(); ++i) {
-    slips += now.cameras[i].slips - (before.cameras.empty() ? 0 : before.cameras[i].slips);
+    slips += now.cameras[i].slips - (before->cameras.empty() ? 0 : before->cameras[i].slips);
   }
   if (complete == 0) {
     report.level = DriveMonitor::Level::kError;
@@ -57,6 +65,7 @@ DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, const TriggerGr
   add("late frames", now.late, &report);
   report.values.emplace_back("mean spread of stamps", milliseconds(now.mean_spread_s));
   report.values.emplace_back("largest spread of stamps", milliseconds(now.max_spread_s));
+  *before = now;
   return report;
 }
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "vcharge_camera_driver/can_reader.h"
 #include "vcharge_camera_driver/frame_source.h"
 #include "vcharge_camera_driver/trigger_grouper.h"
@@ -7,11 +10,12 @@
 
 namespace vcharge {
 
-/// State of one camera.
+/// State of one camera; `counts`: if it has a trigger in common with others.
 DriveMonitor::Report reportCamera(const std::string& name, const CameraStatus& status,
-                                  const TriggerCameraCounts& counts);
-/// State of the synchronization; `before` holds the counts at the previous report.
-DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, const TriggerGrouperCounts& before);
+                                  const std::optional<TriggerCameraCounts>& counts);
+/// State of the synchronization; `before` holds the counts of the previous report, and then those of this
+/// one.
+DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, TriggerGrouperCounts* before);
 /// State of the CAN bus.
 DriveMonitor::Report reportCan(const CanStatus& status);
 

@@ -21,8 +21,9 @@ DriverOptions completeOptions(const DriverOptions& options, const CameraRig& rig
   }
   const cv::Size size = rig.cameras.at(rig.cameraIndex(complete.cameras.front())).image_size_px;
   for (const std::string& name : complete.cameras) {
-    checkImageSize(rig.cameras[rig.cameraIndex(name)], size,
-                   "parameter " + source + ": cameras: " + complete.cameras.front());
+    const RigCamera& camera = rig.cameras[rig.cameraIndex(name)];
+    checkImageSize(camera, size, "parameter " + source + ": cameras: " + complete.cameras.front());
+    complete.v4l2.readouts_s.push_back(camera.timing.readout_s);
   }
   complete.v4l2.capture.image_size_px = size;
   return complete;

@@ -6,9 +6,11 @@
 
 namespace vcharge {
 
-MessageSink::MessageSink(size_t num_cameras, const TriggerGrouperOptions& options, double stamp_offset_s,
-                         GroupCallback callback)
-    : stamp_offset_(durationFromSeconds(stamp_offset_s)),
+MessageSink::MessageSink(size_t num_cameras, const TriggerGrouperOptions& options, bool has_trigger,
+                         double stamp_offset_s, GroupCallback callback)
+    : num_cameras_(num_cameras),
+      has_trigger_(has_trigger),
+      stamp_offset_(durationFromSeconds(stamp_offset_s)),
       callback_(std::move(callback)),
       grouper_(num_cameras, options) {}
 
@@ -36,6 +38,12 @@ sensor_msgs::ImagePtr MessageSink::messageOf(const Image& image) {
 void MessageSink::add(const CapturedFrame& frame) {
   CapturedFrame shifted = frame;
   shifted.stamp = frame.stamp + stamp_offset_;
+  if (!has_trigger_) {
+    MultiFrame single{shifted.stamp, std::vector<Image>(num_cameras_)};
+    single.images[frame.camera_index] = frame.image;
+    callback_(single);
+    return;
+  }
   TriggerGrouper::Groups groups;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -60,6 +68,10 @@ Duration MessageSink::idle() {
 TriggerGrouperCounts MessageSink::counts() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return grouper_.counts();
+}
+
+std::optional<TriggerCameraCounts> MessageSink::countsOf(size_t camera) const {
+  return has_trigger_ ? std::optional(counts().cameras.at(camera)) : std::nullopt;
 }
 
 void MessageSink::pass(const TriggerGrouper::Groups& groups) {

@@ -35,8 +35,9 @@ struct DriverOptions {
   VCHARGE_OPTION(bool, loop, false, anyValue(), "Whether the images of a folder repeat.");
   VCHARGE_OPTION_GROUP(V4l2FrameSourceOptions, v4l2, {},
                        "Capture from the cameras; the rig sets the image size.");
-  VCHARGE_OPTION(double, stamp_offset_s, 0.0, between(-1.0, 1.0),
-                 "Added to the cameras' stamps, for example minus half the exposure.");
+  VCHARGE_OPTION(
+      double, stamp_offset_s, 0.0, between(-1.0, 1.0),
+      "Added to the stamps of the middle of the exposure, for example minus the time of transmission.");
   VCHARGE_OPTION(OdometrySourceKind, odometry_source, OdometrySourceKind::kWheelTicks, anyValue(),
                  "Source of the wheel data.");
   VCHARGE_OPTION(std::string, can_interface, "can0", anyValue(), "Network interface of the CAN bus.");

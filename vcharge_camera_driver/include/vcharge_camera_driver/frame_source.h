@@ -38,6 +38,9 @@ struct CameraStatus {
   uint64_t damaged = 0;  ///< frames flagged as damaged, too short, or not decodable
   uint64_t timeouts = 0;
   uint64_t connections = 0;  ///< number of times the device was opened
+  std::optional<double> exposure_s;
+  /// Frames per second of the kernel's clock since the device was opened, from numbers and stamps.
+  std::optional<double> rate_hz;
 };
 
 /// A source of frames: cameras, or the images of a recorded drive.

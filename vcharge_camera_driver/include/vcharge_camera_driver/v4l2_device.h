@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,9 +48,9 @@ struct V4l2Control {
 struct V4l2Frame {
   uint32_t buffer_index = 0;
   uint32_t sequence = 0;
-  /// Time of the kernel's CLOCK_MONOTONIC at the end of the frame, or at the start of its exposure, depending
-  /// on the driver.
+  /// Time of the kernel's CLOCK_MONOTONIC at the end of the frame.
   Timestamp monotonic_stamp;
+  bool marks_start = false;      ///< the stamp is that of the start of the exposure instead
   bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown; uses the time of dequeue()
   bool is_damaged = false;       ///< V4L2_BUF_FLAG_ERROR
   const uint8_t* data = nullptr;
@@ -78,6 +79,8 @@ class V4l2Device {
   /// Returns the frame's buffer to the kernel.
   void enqueue(const V4l2Frame& frame);
 
+  /// Present exposure of each line; nothing if the camera does not tell.
+  std::optional<double> exposure_s() const;
   std::vector<V4l2Control> controls() const;
   int32_t control(const std::string& name) const;
   void setControl(const std::string& name, int32_t value);

@@ -239,6 +239,7 @@ bool V4l2Device::dequeue(V4l2Frame* frame) {
                                ? Timestamp::fromNanoseconds(int64_t{1000000000} * buffer.timestamp.tv_sec +
                                                             int64_t{1000} * buffer.timestamp.tv_usec)
                                : monotonicNow();
+  frame->marks_start = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   frame->is_damaged = hasFlag(buffer.flags, V4L2_BUF_FLAG_ERROR);
   frame->data = static_cast<const uint8_t*>(memory.data);
   frame->size_bytes = std::min<size_t>(buffer.bytesused, memory.size_bytes);
@@ -260,6 +261,15 @@ void V4l2Device::enqueue(const V4l2Frame& frame) {
   if (v4l2Ioctl(fd_.get(), VIDIOC_QBUF, &buffer) != 0) {
     fail("does not take buffer " + std::to_string(frame.buffer_index));
   }
+}
+
+std::optional<double> V4l2Device::exposure_s() const {
+  constexpr double kUnit_s = 1e-4;
+  v4l2_control request{V4L2_CID_EXPOSURE_ABSOLUTE, 0};
+  if (v4l2Ioctl(fd_.get(), VIDIOC_G_CTRL, &request) != 0 || request.value <= 0) {
+    return std::nullopt;
+  }
+  return kUnit_s * request.value;
 }
 
 std::vector<V4l2Control> V4l2Device::controls() const {

@@ -154,6 +154,7 @@ TEST_F(V4l2DeviceTest, SetsControlsByTheirNames) {
   V4l2Device device(path, options);
   EXPECT_EQ(device.control("gain"), 17);
   EXPECT_EQ(device.control("exposure_time_absolute"), 50);
+  EXPECT_NEAR(device.exposure_s().value_or(0.0), 0.005, 1e-9);
   EXPECT_EQ(device.controls().size(), 3u);
   EXPECT_THAT([&] { device.setControl("gain", 256); },
               ::testing::ThrowsMessage<InputError>(AllOf(HasSubstr("gain"), HasSubstr("[0, 255]"))));

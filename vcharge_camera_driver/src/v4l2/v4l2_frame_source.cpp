@@ -14,12 +14,20 @@ namespace {
 
 constexpr Duration kClockPeriod = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
+/// Time after which a rate is precise: stamps jitter by a millisecond.
+constexpr double kMinRateTime_s = 5.0;
 
 int toPollTimeout(Duration wait) {
   // Rounds up: waking up slightly too early would cause a busy loop until the deadline.
   const auto milliseconds =
       std::chrono::ceil<std::chrono::milliseconds>(std::clamp(wait, Duration(0), kLongestWait));
   return static_cast<int>(milliseconds.count());
+}
+
+/// Time from a frame's stamp to the middle of the exposure of its middle line. Lines begin their exposure one
+/// after the other; the last one is read out when the frame ends.
+Duration toMiddleOfExposure(const V4l2Frame& frame, double exposure_s, double readout_s) {
+  return durationFromSeconds((frame.marks_start ? 0.5 : -0.5) * (exposure_s + readout_s));
 }
 
 }  // namespace
@@ -30,6 +38,9 @@ struct V4l2FrameSource::Camera {
   Timestamp next_attempt;  // on the monotonic clock, like last_frame
   Timestamp last_frame;
   std::optional<uint32_t> last_sequence;
+  Timestamp first_stamp;  // of the kernel, since the device was opened, like the next member
+  uint32_t first_sequence = 0;
+  double readout_s = 0.0;
   CameraStatus status;
 };
 
@@ -38,10 +49,13 @@ V4l2FrameSource::V4l2FrameSource(std::vector<std::string> devices, const V4l2Fra
     : options_(options), clock_(std::move(drive_clock)), wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   options.validate();
   check(static_cast<bool>(wake_), "V4l2FrameSource: no event descriptor");
+  check(options.readouts_s.empty() || options.readouts_s.size() == devices.size(),
+        "V4l2FrameSource: expected a readout time of each camera, or none");
   for (std::string& device : devices) {
     cameras_.push_back(std::make_unique<Camera>());
     cameras_.back()->status.device = std::move(device);
     cameras_.back()->status.message = "not opened yet";
+    cameras_.back()->readout_s = options.readouts_s.empty() ? 0.0 : options.readouts_s[cameras_.size() - 1];
   }
 }
 
@@ -68,6 +82,8 @@ void V4l2FrameSource::connect(Camera* camera, Timestamp now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     camera->status.streaming = true;
     camera->status.message = "streaming " + toString(camera->device->pixelFormat());
+    camera->status.exposure_s = camera->device->exposure_s();
+    camera->status.rate_hz.reset();
     ++camera->status.connections;
   } catch (const InputError& error) {
     disconnect(camera, error.what(), now);
@@ -80,6 +96,16 @@ void V4l2FrameSource::disconnect(Camera* camera, const std::string& reason, Time
   const std::lock_guard<std::mutex> lock(mutex_);
   camera->status.streaming = false;
   camera->status.message = reason;
+}
+
+void V4l2FrameSource::updateExposures() {
+  for (const auto& camera : cameras_) {
+    if (camera->device) {
+      const std::optional<double> exposure_s = camera->device->exposure_s();
+      const std::lock_guard<std::mutex> lock(mutex_);
+      camera->status.exposure_s = exposure_s;
+    }
+  }
 }
 
 Duration V4l2FrameSource::maintain(Timestamp now) {
@@ -109,7 +135,9 @@ bool V4l2FrameSource::take(size_t index, const V4l2Frame& frame, FrameSink* sink
   CapturedFrame captured;
   captured.camera_index = index;
   captured.sequence = frame.sequence;
-  captured.stamp = clock_.toDriveTime(frame.monotonic_stamp);
+  captured.stamp =
+      clock_.toDriveTime(frame.monotonic_stamp +
+                         toMiddleOfExposure(frame, camera.status.exposure_s.value_or(0.0), camera.readout_s));
   captured.image = sink->acquire(camera.device->size());
   std::string problem = frame.is_damaged ? "flagged as damaged by its driver" : "";
   if (problem.empty()) {
@@ -123,8 +151,15 @@ bool V4l2FrameSource::take(size_t index, const V4l2Frame& frame, FrameSink* sink
     const std::lock_guard<std::mutex> lock(mutex_);
     CameraStatus& status = camera.status;
     ++(problem.empty() ? status.frames : status.damaged);
-    if (camera.last_sequence && frame.sequence > *camera.last_sequence) {
+    if (!camera.last_sequence) {
+      camera.first_stamp = frame.monotonic_stamp;
+      camera.first_sequence = frame.sequence;
+    } else if (frame.sequence > *camera.last_sequence) {
       status.lost += frame.sequence - *camera.last_sequence - 1;
+    }
+    const double since_s = toSeconds(frame.monotonic_stamp - camera.first_stamp);
+    if (since_s > kMinRateTime_s) {
+      status.rate_hz = (frame.sequence - camera.first_sequence) / since_s;
     }
     status.message = problem.empty() ? "streaming " + format +
                                            (frame.has_kernel_stamp ? "" : ", without the kernel's stamps")
@@ -159,6 +194,7 @@ void V4l2FrameSource::run(FrameSink* sink) {
     Duration wait = maintain(before);
     if (before >= next_clock_update) {
       clock_.update();
+      updateExposures();
       next_clock_update = before + kClockPeriod;
     }
     wait = std::min(wait, sink->idle());

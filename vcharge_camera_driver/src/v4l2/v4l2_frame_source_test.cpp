@@ -92,6 +92,31 @@ class GroupingSink : public FrameSink {
   std::map<const cv::Mat*, int> buffers_;
 };
 
+// Records the stamps of each camera's frames, over those of their pulses.
+class StampSink : public FrameSink {
+ public:
+  StampSink(size_t num_cameras, double period_s) : delays_s(num_cameras), period_s_(period_s) {}
+
+  Image acquire(cv::Size size_px) override { return {cv::Mat(size_px, CV_8UC1), nullptr}; }
+  void add(const CapturedFrame& frame) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    delays_s[frame.camera_index].push_back(toSeconds(frame.stamp - Timestamp()) -
+                                           period_s_ * static_cast<double>(pulseIn(frame.image.pixels)));
+  }
+  Duration idle() override { return std::chrono::seconds(1); }
+
+  bool hasFrames(size_t num) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::all_of(delays_s.begin(), delays_s.end(),
+                       [&](const auto& each) { return each.size() >= num; });
+  }
+  std::vector<std::vector<double>> delays_s;  // read without lock after the end of the run
+
+ private:
+  const double period_s_;
+  std::mutex mutex_;
+};
+
 // Runs a source in a thread.
 class Running {
  public:
@@ -237,6 +262,30 @@ TEST_F(V4l2FrameSourceTest, LosesNoFrameOfFourLargeCamerasAndHardlyWorks) {
   for (const TriggerCameraCounts& camera : sink.counts().cameras) {
     EXPECT_EQ(camera.lost, 0u);
     EXPECT_EQ(camera.slips, 0u);
+  }
+}
+
+TEST_F(V4l2FrameSourceTest, StampsAreThoseOfTheMiddleOfTheExposure) {
+  std::vector<std::string> devices{cameras_.plug(0, kSmall),
+                                   cameras_.plug(1, std::string(kSmall) + "stamps_start=1\n")};
+  V4l2FrameSourceOptions options = smallImages();
+  options.capture.controls = {"exposure_time_absolute=40"};  // 4 ms
+  options.readouts_s = {0.006, 0.002};
+  V4l2FrameSource source(devices, options, monotonicNow);
+  StampSink sink(2, 0.02);
+  {
+    const Running running(&source, &sink);
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (!sink.hasFrames(5) && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_NEAR(source.status().at(0).exposure_s.value_or(0.0), 0.004, 1e-9);
+  }
+  ASSERT_TRUE(sink.hasFrames(5));
+  // The emulated stamps are 1 ms after the pulse.
+  for (size_t i = 0; i < 5; ++i) {
+    EXPECT_NEAR(sink.delays_s[0][i], 0.001 - 0.5 * (0.004 + 0.006), 2e-4);
+    EXPECT_NEAR(sink.delays_s[1][i], 0.001 + 0.5 * (0.004 + 0.002), 2e-4);
   }
 }
 
