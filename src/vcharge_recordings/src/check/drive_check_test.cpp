@@ -2,97 +2,16 @@
 
 #include <cmath>
 #include <functional>
-#include <random>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "testing/weaving_drive.h"
+
 namespace vcharge {
 namespace {
 
-constexpr double kPeriod_s = 0.08;
-constexpr int kFrames = 130;
-constexpr double kSpeed_m_per_s = 1.5;
-const Timestamp kStart = Timestamp::fromSeconds(1000.0);
-
-/// Yaw of a drive that weaves to both sides, so that the yaw rate changes all the time.
-double yawAt(double time_s) {
-  return 0.9 * std::sin(0.55 * time_s) + 0.25 * std::sin(1.7 * time_s);
-}
-
-RigidTransform worldFromVehicle(double time_s) {
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  constexpr double kStep_s = 0.01;
-  for (double t = 0.0; t + 0.5 * kStep_s < time_s; t += kStep_s) {
-    const double yaw = yawAt(t + 0.5 * kStep_s);
-    position += kStep_s * kSpeed_m_per_s * Eigen::Vector2d(std::cos(yaw), std::sin(yaw));
-  }
-  return RigidTransform::planar(position.x(), position.y(), yawAt(time_s));
-}
-
-/// Brightness of a textured wall all around, 15 m away, and of a textured ground.
-double brightness(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
-  const Eigen::Vector2d from = origin.head<2>() - Eigen::Vector2d(10.0, 0.0), along = ray.head<2>();
-  const double a = along.squaredNorm(), b = from.dot(along), c = from.squaredNorm() - 15.0 * 15.0;
-  double u = 0.0, v = 0.0, length = 1e9;
-  if (a > 1e-9) {
-    length = (-b + std::sqrt(std::max(0.0, b * b - a * c))) / a;
-    const Eigen::Vector3d hit = origin + length * ray;
-    u = 15.0 * std::atan2(hit.y(), hit.x() - 10.0);
-    v = hit.z();
-  }
-  if (ray.z() < 0.0 && -origin.z() / ray.z() < length) {
-    const Eigen::Vector3d hit = origin - origin.z() / ray.z() * ray;
-    u = 2.0 * hit.x();
-    v = 2.0 * hit.y() + 31.0;
-  }
-  return 115.0 + 25.0 * std::sin(1.9 * u + 1.3 * std::sin(0.8 * v)) +
-         25.0 * std::sin(2.3 * v + 1.1 * std::sin(1.1 * u)) + 20.0 * std::sin(0.7 * u + 0.9 * v) +
-         20.0 * std::sin(4.1 * u - 3.3 * v + std::sin(u));
-}
-
-CameraRig twoCameras() {
-  CameraRig rig;
-  for (const double yaw : {1.2, -1.2}) {
-    RigCamera camera{yaw > 0.0 ? "left" : "right",
-                     yaw > 0.0 ? "left_optical" : "right_optical",
-                     cv::Size(320, 200),
-                     MeiCamera({0.9, 180.0, 180.0, 159.5, 99.5, 0.0, 0.0, 0.0, 0.0}),
-                     2.6,
-                     "",
-                     cv::Mat(),
-                     std::nullopt,
-                     std::nullopt};
-    Eigen::Matrix3d vehicle_from_forward;
-    vehicle_from_forward << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    camera.vehicle_from_camera = RigidTransform(
-        Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::Quaterniond(vehicle_from_forward),
-        Eigen::Vector3d(1.0, yaw > 0.0 ? 0.8 : -0.8, 1.0));
-    rig.cameras.push_back(camera);
-  }
-  return rig;
-}
-
-cv::Mat render(const RigCamera& camera, const RigidTransform& world_from_vehicle) {
-  const RigidTransform world_from_camera = world_from_vehicle * *camera.vehicle_from_camera;
-  cv::Mat image(camera.image_size_px, CV_8UC1, cv::Scalar(0));
-  camera.model.visit([&](const auto& model) {
-    for (int y = 0; y < image.rows; ++y) {
-      for (int x = 0; x < image.cols; ++x) {
-        Eigen::Vector3d ray;
-        if (model.unproject(Eigen::Vector2d(x, y), &ray)) {
-          image.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(
-              brightness(world_from_camera.translation(), world_from_camera.rotation() * ray));
-        }
-      }
-    }
-  });
-  cv::Mat noise(image.size(), CV_8SC1);
-  cv::RNG random(static_cast<uint64_t>(1e6 * world_from_camera.translation().x()) + 7);
-  random.fill(noise, cv::RNG::NORMAL, 0.0, 2.0);
-  cv::add(image, noise, image, cv::noArray(), CV_8U);
-  return image;
-}
+using namespace weaving_drive;
 
 /// A drive, and the faults that are added before it is checked.
 struct Drive {
@@ -106,14 +25,10 @@ struct Drive {
 class DriveCheckerTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const CameraRig rig = twoCameras();
-    images_ = new std::vector<std::vector<cv::Mat>>(2);
+    images_ = new std::vector<std::vector<cv::Mat>>(renderImages());
     poses_ = new std::vector<RigidTransform>;
-    for (int frame = 0; frame < 4 * kFrames; ++frame) {
-      poses_->push_back(worldFromVehicle(0.25 * kPeriod_s * frame));
-      for (size_t camera = 0; camera < 2 && frame % 4 == 0; ++camera) {
-        (*images_)[camera].push_back(render(rig.cameras[camera], poses_->back()));
-      }
+    for (int i = 0; i < 4 * kFrames; ++i) {
+      poses_->push_back(worldFromVehicle(0.25 * kPeriod_s * i));
     }
   }
   static void TearDownTestSuite() {
@@ -205,6 +120,19 @@ TEST_F(DriveCheckerTest, MeasuresHowLateTheOdometryIs) {
     ASSERT_EQ(std::sscanf(what.c_str(), "the odometry's stamps are %lf ms", &found_ms), 1) << what;
     EXPECT_NEAR(found_ms, 1e3 * late_s, 5.0);
   }
+}
+
+TEST_F(DriveCheckerTest, TellsWhichCameraHasAnotherClock) {
+  Drive drive;
+  drive.rig.stamp_tolerance_s = 0.04;
+  drive.change_image = [](size_t camera, int, Timestamp* stamp, cv::Mat*) {
+    *stamp = *stamp + durationFromSeconds(camera == 1 ? -0.03 : 0.0);
+    return true;
+  };
+  const std::vector<CheckFinding> findings = check(drive);
+  EXPECT_NE(notPassed(findings).find("WARN right: time"), std::string::npos) << notPassed(findings);
+  drive.rig.cameras[1].timing.clock_offset_s = 0.03;
+  EXPECT_EQ(notPassed(check(drive)), "");
 }
 
 TEST_F(DriveCheckerTest, FindsOdometryThatTurnsOtherwise) {

@@ -24,6 +24,8 @@ constexpr double kTrimmed = 0.2;
 constexpr double kMinTurn_rad = 0.3;
 constexpr double kMaxOffsetSigma_s = 0.005;
 constexpr double kOffset_s = 0.02, kLargeOffset_s = 0.05;
+/// The same for one camera against all.
+constexpr double kCameraOffset_s = 0.004, kLargeCameraOffset_s = 0.05, kCameraOffsetSigmas = 3.5;
 /// Rotations from pairs of images have errors of some percent.
 constexpr double kTurnError = 0.06, kLargeTurnError = 0.25;
 
@@ -45,11 +47,13 @@ struct ComparedMotion {
   double distance_m, turn_rad;
 };
 
-std::vector<ComparedMotion> compareMotions(const OdometryPath& path,
+/// The motions that the path covers. `clock_offset_s`: as in ImageTiming.
+std::vector<ComparedMotion> compareMotions(const OdometryPath& path, double clock_offset_s,
                                            const std::vector<ImageMotion>& motions) {
   std::vector<ComparedMotion> compared;
   for (const ImageMotion& motion : motions) {
-    const double begin_s = path.secondsOf(motion.begin), end_s = path.secondsOf(motion.end);
+    const double begin_s = path.secondsOf(motion.begin) + clock_offset_s;
+    const double end_s = path.secondsOf(motion.end) + clock_offset_s;
     if (path.covers(begin_s) && path.covers(end_s)) {
       compared.push_back({&motion, begin_s, end_s, path.distance_m(end_s) - path.distance_m(begin_s),
                           path.yaw_rad(end_s) - path.yaw_rad(begin_s)});
@@ -180,9 +184,25 @@ void judgeStanding(const std::vector<std::vector<ComparedMotion>>& motions, Chec
                                      : "do wheels spin, or do cameras hang?");
 }
 
+/// Do a camera's stamps agree with those of all?
+void judgeClock(const std::string& name, const OffsetFit& camera, const OffsetFit& all,
+                CheckFindings* findings) {
+  // Stamps that are early make the odometry's look late.
+  const double early_s = camera.offset_s - all.offset_s;
+  if (camera.sigma_s < kMaxOffsetSigma_s) {
+    findings->atMost(name + ": time", std::max(0.0, std::abs(early_s) - kCameraOffsetSigmas * camera.sigma_s),
+                     kCameraOffset_s, kLargeCameraOffset_s,
+                     "its stamps are " + toText(1e3 * early_s, 1) +
+                         " ms early against those of all cameras (sigma " + toText(1e3 * camera.sigma_s, 1) +
+                         " ms)",
+                     "does rig.yaml tell its clock_offset_s?");
+  }
+}
+
 void judgeTurns(const OdometryPath& path, const CameraRig& rig,
                 const std::vector<std::vector<ComparedMotion>>& motions, CheckFindings* findings) {
   std::vector<Turn> turns;
+  std::vector<std::vector<Turn>> turns_of_camera(motions.size());
   double sum_rad = 0.0;
   for (size_t camera = 0; camera < motions.size(); ++camera) {
     const std::optional<Eigen::Vector3d> axis = turnAxis(motions[camera]);
@@ -201,6 +221,7 @@ void judgeTurns(const OdometryPath& path, const CameraRig& rig,
     for (const ComparedMotion& compared : motions[camera]) {
       if (compared.motion->rotation_rad) {
         turns.push_back({compared.begin_s, compared.end_s, axis->dot(*compared.motion->rotation_rad)});
+        turns_of_camera[camera].push_back(turns.back());
         sum_rad += std::abs(turns.back().turn_rad);
       }
     }
@@ -225,6 +246,11 @@ void judgeTurns(const OdometryPath& path, const CameraRig& rig,
                      "the odometry's stamps are " + toText(1e3 * fit.offset_s, 1) +
                          " ms late against the images' (sigma " + toText(1e3 * fit.sigma_s, 1) + " ms)",
                      "stamps taken at arrival, or of another clock?");
+  }
+  for (size_t camera = 0; camera < motions.size(); ++camera) {
+    if (turns_of_camera[camera].size() >= kMinMotions) {
+      judgeClock(rig.cameras[camera].name, fitOffset(path, turns_of_camera[camera]), fit, findings);
+    }
   }
 }
 
@@ -265,8 +291,8 @@ void judgeDirections(const CameraRig& rig, const std::vector<std::vector<Compare
 void judgeAgreement(const OdometryPath& path, const CameraRig& rig,
                     const std::vector<std::vector<ImageMotion>>& motions, CheckFindings* findings) {
   std::vector<std::vector<ComparedMotion>> compared;
-  for (const std::vector<ImageMotion>& of_camera : motions) {
-    compared.push_back(compareMotions(path, of_camera));
+  for (size_t camera = 0; camera < motions.size(); ++camera) {
+    compared.push_back(compareMotions(path, rig.cameras[camera].timing.clock_offset_s, motions[camera]));
   }
   judgeStanding(compared, findings);
   judgeTurns(path, rig, compared, findings);
