@@ -9,7 +9,7 @@ import yaml
 
 from vcharge_evaluation import spoiled_drives
 from vcharge_evaluation.chain.figures import judge_rig as judge_and_draw_rig
-from vcharge_evaluation.drives import shutter_words
+from vcharge_evaluation.drives import TIMINGS
 from vcharge_evaluation.live import rig_calibration as live_rig_calibration
 from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
@@ -23,7 +23,7 @@ OPTIONS = {"calibrate_rig": "calibration.yaml", "calibrate_rig_from_map": "calib
 PARTS = ("rigs", "live", "kinds", "heat", "shutters", "seeds", "wheels", "map", "faults", "real")
 # What heat does to lenses: focal lengths, relative, and principal points over the image's width.
 HEAT_FOCAL, HEAT_SHIFT = 0.002, 0.001
-READOUTS_MS = (10, 25)
+MAX_TIMED_RATIO = 1.3  # of an error with a timing that the rig tells, to that with a global shutter and one trigger
 # Cameras of the rig `eight` that are calibrated together, of three camera models.
 KINDS = {"one camera": ["front"], "two without a common view": ["left", "right"],
          "two pinhole cameras and a fisheye": ["roof", "rear", "left_pillar"],
@@ -41,6 +41,8 @@ def arguments():
     parser.add_argument("--image-step", type=int, default=2,
                         help="use every n-th of 12.5 images a second: 2 gives 500 frames in 80 s")
     parser.add_argument("--duration-s", type=float, default=80.0)
+    parser.add_argument("--timings", nargs="*", default=[one.name for one in TIMINGS], choices=[one.name for one in TIMINGS],
+                        help="of the part shutters")
     parser.add_argument("--seeds", type=int, default=10, help="number of noise seeds, on one drive of half-size images")
     return parser.parse_args()
 
@@ -195,40 +197,58 @@ def evaluate_heat(args, results):
                 f"image scale {args.image_scale:g}", *columns)
 
 
-def evaluate_shutters(args, results):
-    """Rolling shutters of which the rig says nothing, that it tells, and that the drive shows."""
-    columns = []
+def timing_errors(calibration, timing):
+    """Errors (s) of the readout time and the clock offset of each camera, and the same over their standard deviations."""
+    found = [camera["timing"] for camera in calibration.run.found["cameras"]]
+    errors = np.array([[(-1 if one["readout_direction"] == "up" else 1) * one["readout_s"] - timing.readout_ms / 1000,
+                        one["clock_offset_s"]] for one in found])
+    return errors, errors / [one["standard_deviations"] for one in found]
+
+
+def timed_figures(args, drive, least, timing):
+    """A drive with a timing of which the rig tells nothing but how far stamps may differ, that it tells, and that is found."""
+    folder = args.work / f"{drive.folder.name}_{timing.name.replace(', ', '_').replace(' ', '_')}"
+    simulate(folder, [*drive.words, *USUAL_WHEELS, *timing.words()])
+    truth = folder / "rig_truth.yaml"
     options = args.work / "finds_timing.yaml"
     options.write_text(yaml.safe_dump(changed_options(refine_timing=True)))
+
+    def calibrated(name, readout_ms, direction="down", told_options=None):
+        rig = spoiled_drives.write_timed_rig(truth, folder / f"{name}.yaml", readout_ms / 1000, direction,
+                                             timing.tolerance_ms / 1000)
+        return Calibration(folder, rig, name=f"rig_{name}", truth=truth, options=told_options)
+
+    runs = {"given": calibrated("given", timing.readout_ms), "found": calibrated("found", 0, told_options=options)}
+    if timing.readout_ms:
+        runs["unknown"] = calibrated("unknown", 0)
+        yield figure("verdict, timing unknown", runs["unknown"].verdict, equal="WARN")
+        misled = calibrated("misled", timing.readout_ms, "up")
+        yield figure("verdict, readout in the wrong direction", misled.verdict, equal="WARN")
+        yield Figure("told", "; ".join(misled.remarks[:1]))
+    for name, one in (("at once", least), *((f"timing {name}", one) for name, one in runs.items())):
+        for entry in list(one.figures())[1:3]:
+            yield Figure(f"{entry.name}, {name}", entry.value, entry.unit)
+    for entry, at_once in zip(list(runs["given"].figures())[1:3], list(least.figures())[1:3]):
+        yield figure(f"{entry.name}, given over at once", entry.value / at_once.value, at_most=MAX_TIMED_RATIO)
+    errors, over_sigmas = timing_errors(runs["found"], timing)
+    for i, axis in enumerate(("readout time", "clock offset")):
+        yield figure(f"largest error of a {axis}", 1000 * float(np.abs(errors[:, i]).max()), "ms", at_most=0.5)
+        yield figure(f"mean normalized squared error, {axis}", float(np.square(over_sigmas[:, i]).mean()), at_least=0.5,
+                     at_most=2.0)
+    relative = errors[:, 1] - errors[:, 1].mean()
+    yield figure("largest error of a clock offset against the other cameras", 1000 * float(np.abs(relative).max()), "ms",
+                 at_most=0.5)
+
+
+def evaluate_shutters(args, results):
+    """Rolling shutters, and cameras without a common trigger."""
+    columns = []
     for rig in args.rigs:
         drive = Drive(args, rig, args.image_scale)
         sound = drive.read("right_wheels", *USUAL_WHEELS)
         least = Calibration(sound, sound / "rig_truth.yaml")
-        for readout_ms in READOUTS_MS:
-            folder = args.work / f"{drive.folder.name}_readout{readout_ms}"
-            simulate(folder, [*drive.words, *USUAL_WHEELS, *shutter_words(readout_ms)])
-            truth = folder / "rig_truth.yaml"
-            told, wrong = (spoiled_drives.write_timed_rig(truth, folder / f"{name}.yaml", readout_ms / 1000, direction)
-                           for name, direction in (("told", "down"), ("wrong", "up")))
-            kept = Calibration(folder, truth, name="rig_kept")
-            given = Calibration(folder, told, name="rig_given", truth=truth)
-            found = Calibration(folder, truth, name="rig_found", options=options)
-            misled = Calibration(folder, wrong, name="rig_misled", truth=truth)
-            timings = [camera["timing"] for camera in found.run.found["cameras"]]
-            errors = np.array([[(-1 if timing["readout_direction"] == "up" else 1) * timing["readout_s"] - readout_ms / 1000,
-                                timing["clock_offset_s"]] for timing in timings])
-            squares = np.square(errors / [timing["standard_deviations"] for timing in timings]).mean(axis=0)
-            columns.append((f"{rig}, {readout_ms} ms", [
-                *(Figure(f"{entry.name}, {name}", entry.value, entry.unit)
-                  for name, one in (("global shutter", least), ("readout unknown", kept), ("readout given", given),
-                                    ("readout found", found)) for entry in list(one.figures())[1:3]),
-                figure("verdict, readout unknown", kept.verdict, equal="WARN"),
-                figure("verdict, readout in the wrong direction", misled.verdict, equal="WARN"),
-                Figure("told", "; ".join(misled.remarks[:1])),
-                figure("largest error of a readout time", 1000 * float(np.abs(errors[:, 0]).max()), "ms", at_most=0.5),
-                figure("largest error of a clock offset", 1000 * float(np.abs(errors[:, 1]).max()), "ms", at_most=0.5),
-                *(figure(f"mean normalized squared error, {axis}", float(square), at_least=0.5, at_most=2.0)
-                  for axis, square in zip(("readout time", "clock offset"), squares))]))
+        columns += [(f"{rig}, {timing.name}", list(timed_figures(args, drive, least, timing)))
+                    for timing in TIMINGS if timing.name in args.timings]
     results.add(f"Rolling shutters, image scale {args.image_scale:g}", *columns)
 
 

@@ -1,4 +1,5 @@
 """Simulated drives that several stages share, and what is made from them once: the masks of the car's own body, and maps."""
+import dataclasses
 import hashlib
 
 import cv2
@@ -69,6 +70,26 @@ def trigger_words(shifts_ms):
     names, values = ", ".join(shifts_ms), ", ".join(f"{shift / 1000:g}" for shift in shifts_ms.values())
     return ("--set", f"faults.image_stamp_shift.cameras=[{names}]", "--set", f"faults.image_stamp_shift.shifts_s=[{values}]",
             "--set", "faults.image_stamp_shift.moves_exposure=true") if shifts_ms else ()
+
+
+@dataclasses.dataclass(frozen=True)
+class Timing:
+    """Of all cameras of a drive."""
+    name: str
+    readout_ms: float = 0
+    shifts_ms: tuple = ()  # of (camera, time after the others)
+    tolerance_ms: float = 0
+
+    def words(self):
+        """Words that give a drive this timing."""
+        return (*shutter_words(self.readout_ms), *trigger_words(dict(self.shifts_ms)))
+
+
+AT_ONCE = Timing("at once")
+FREE = (("left", 20), ("rear", -30), ("right", 37))
+TIMINGS = (Timing("readout 10 ms", 10), Timing("readout 25 ms", 25),
+           Timing("left and right 7 ms later", 0, (("left", 7), ("right", 7)), 10),
+           Timing("free-running", 0, FREE, 40), Timing("free-running, readout 25 ms", 25, FREE, 40))
 
 
 def condition_words(condition):

@@ -1,11 +1,10 @@
 """Rolling shutters and cameras without a common trigger: errors of the stages after calibration, against those of the same
 drives with global shutters and one trigger, with a rig that tells the timing and with one that does not."""
 import argparse
-import dataclasses
 
 import numpy as np
 
-from vcharge_evaluation.drives import found_masks, loop_drive, other_day_drive, shutter_words, trigger_words
+from vcharge_evaluation.drives import AT_ONCE, TIMINGS, found_masks, loop_drive, other_day_drive
 from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.obstacles import judge_obstacles, summary
 from vcharge_evaluation.ranges import AS_ON_THE_CAR, RangeErrors
@@ -14,26 +13,6 @@ from vcharge_evaluation.spoiled_drives import write_timed_rig
 from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once, say
 
 MAX_RATIO = 1.3  # of an error with a timing that the rig tells, to that with a global shutter
-FREE_RUNNING_MS = {"left": 20, "rear": -30, "right": 37}
-
-
-@dataclasses.dataclass(frozen=True)
-class Timing:
-    """Of all cameras of a drive."""
-    name: str
-    readout_ms: float = 0
-    shifts_ms: tuple = ()  # of (camera, time after the others)
-    tolerance_ms: float = 0
-
-    def words(self):
-        return (*shutter_words(self.readout_ms), *trigger_words(dict(self.shifts_ms)))
-
-
-AT_ONCE = Timing("at once")
-FREE = tuple(FREE_RUNNING_MS.items())
-TIMINGS = (Timing("readout 10 ms", 10), Timing("readout 25 ms", 25),
-           Timing("left and right 7 ms later", 0, (("left", 7), ("right", 7)), 10),
-           Timing("free-running", 0, FREE, 40), Timing("free-running, readout 25 ms", 25, FREE, 40))
 STAGES = ("trajectory", "localization", "ranges", "obstacles")
 
 
