@@ -228,8 +228,11 @@ def timed_figures(args, drive, least, timing):
     for name, one in (("at once", least), *((f"timing {name}", one) for name, one in runs.items())):
         for entry in list(one.figures())[1:3]:
             yield Figure(f"{entry.name}, {name}", entry.value, entry.unit)
+    both = runs["given"].errors and least.errors
     for entry, at_once in zip(list(runs["given"].figures())[1:3], list(least.figures())[1:3]):
-        yield figure(f"{entry.name}, given over at once", entry.value / at_once.value, at_most=MAX_TIMED_RATIO)
+        yield figure(f"{entry.name}, given over at once", entry.value / at_once.value if both else None, at_most=MAX_TIMED_RATIO)
+    if not runs["found"].has_rig:
+        return
     errors, over_sigmas = timing_errors(runs["found"], timing)
     for i, axis in enumerate(("readout time", "clock offset")):
         yield figure(f"largest error of a {axis}", 1000 * float(np.abs(errors[:, i]).max()), "ms", at_most=0.5)
@@ -242,14 +245,13 @@ def timed_figures(args, drive, least, timing):
 
 def evaluate_shutters(args, results):
     """Rolling shutters, and cameras without a common trigger."""
-    columns = []
     for rig in args.rigs:
         drive = Drive(args, rig, args.image_scale)
         sound = drive.read("right_wheels", *USUAL_WHEELS)
         least = Calibration(sound, sound / "rig_truth.yaml")
-        columns += [(f"{rig}, {timing.name}", list(timed_figures(args, drive, least, timing)))
-                    for timing in TIMINGS if timing.name in args.timings]
-    results.add(f"Rolling shutters, image scale {args.image_scale:g}", *columns)
+        for timing in (one for one in TIMINGS if one.name in args.timings):
+            results.add(f"Timing, image scale {args.image_scale:g}",
+                        (f"{rig}, {timing.name}", list(timed_figures(args, drive, least, timing))))
 
 
 def evaluate_seeds(args, results):
