@@ -32,6 +32,9 @@ constexpr double kRange_m = 2.5;
 // How a body stands on its wheels while it drives, beside how it stands at rest.
 constexpr double kBodyHeight_m = 0.001;
 constexpr double kBodyTilt_rad = 0.01 / 57.29577951308232;
+/// How far an odometer's stamps are from when its wheels were where it says: they are read in periods, and
+/// count in steps. No drive tells it from an offset of all clocks.
+constexpr double kOdometerDelay_s = 0.0025;
 /// Cosines between a camera's view and the side that its name says, and another side, of swapped cameras.
 constexpr double kMaxOwnSide = 0.2, kMinOtherSide = 0.8;
 
@@ -188,7 +191,7 @@ TimingEstimate timingOf(const RigAdjustmentOptions& options, const RigPriors& pr
   estimate.sigmas = inflation.cwiseProduct(independent.diagonal().cwiseSqrt());
   if (estimate.is_corrected) {
     estimate.found.clock_offset_s += drive.time_offset_s;
-    estimate.sigmas[1] = std::hypot(estimate.sigmas[1], drive.time_offset_sigma_s);
+    estimate.sigmas[1] = std::hypot(estimate.sigmas[1], drive.time_offset_sigma_s, kOdometerDelay_s);
   } else {
     estimate.found.readout_s += uncertainty.deviations[at];
     estimate.found.clock_offset_s += uncertainty.deviations[at + 1];
