@@ -14,6 +14,7 @@ import rostest
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import counted_skips  # noqa: E402,F401
 from drive_fixture import run, run_tool, tool  # noqa: E402
 
 CONFIG = pathlib.Path(rospkg.RosPack().get_path("vcharge_config"))

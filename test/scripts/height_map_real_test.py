@@ -15,6 +15,7 @@ import rostest
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import counted_skips  # noqa: E402,F401
 from drive_fixture import run, tool  # noqa: E402
 
 DATA = os.environ.get("VCHARGE_DATA")
