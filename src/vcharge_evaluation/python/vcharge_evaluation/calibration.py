@@ -9,7 +9,7 @@ import yaml
 
 from vcharge_evaluation import spoiled_drives
 from vcharge_evaluation.chain.figures import judge_rig as judge_and_draw_rig
-from vcharge_evaluation.drives import TIMINGS
+from vcharge_evaluation.drives import MAX_TIMED_RATIO, TIMINGS
 from vcharge_evaluation.live import rig_calibration as live_rig_calibration
 from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
@@ -23,7 +23,6 @@ OPTIONS = {"calibrate_rig": "calibration.yaml", "calibrate_rig_from_map": "calib
 PARTS = ("rigs", "live", "kinds", "heat", "shutters", "seeds", "wheels", "map", "faults", "real")
 # What heat does to lenses: focal lengths, relative, and principal points over the image's width.
 HEAT_FOCAL, HEAT_SHIFT = 0.002, 0.001
-MAX_TIMED_RATIO = 1.3  # of an error with a timing that the rig tells, to that with a global shutter and one trigger
 # Cameras of the rig `eight` that are calibrated together, of three camera models.
 KINDS = {"one camera": ["front"], "two without a common view": ["left", "right"],
          "two pinhole cameras and a fisheye": ["roof", "rear", "left_pillar"],

@@ -86,6 +86,7 @@ class Timing:
 
 
 AT_ONCE = Timing("at once")
+MAX_TIMED_RATIO = 1.3  # of an error with a timing that the rig tells, to that of a drive exposed at once
 FREE = (("left", 20), ("rear", -30), ("right", 37))
 TIMINGS = (Timing("readout 10 ms", 10), Timing("readout 25 ms", 25),
            Timing("left and right 7 ms later", 0, (("left", 7), ("right", 7)), 10),

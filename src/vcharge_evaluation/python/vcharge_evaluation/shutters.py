@@ -4,7 +4,7 @@ import argparse
 
 import numpy as np
 
-from vcharge_evaluation.drives import AT_ONCE, TIMINGS, found_masks, loop_drive, other_day_drive
+from vcharge_evaluation.drives import AT_ONCE, MAX_TIMED_RATIO, TIMINGS, found_masks, loop_drive, other_day_drive
 from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.obstacles import judge_obstacles, summary
 from vcharge_evaluation.ranges import AS_ON_THE_CAR, RangeErrors
@@ -12,7 +12,6 @@ from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.spoiled_drives import write_timed_rig
 from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once, say
 
-MAX_RATIO = 1.3  # of an error with a timing that the rig tells, to that with a global shutter
 STAGES = ("trajectory", "localization", "ranges", "obstacles")
 
 
@@ -113,7 +112,7 @@ def compare(place, stage, timing):
         for kind, value in values.items():
             yield Figure(f"{stage}: {name}, {kind}", value, unit)
         yield figure(f"{stage}: {name}, told over at once", values["told"] / least if "told" in values else None,
-                     at_most=MAX_RATIO)
+                     at_most=MAX_TIMED_RATIO)
 
 
 def main():
