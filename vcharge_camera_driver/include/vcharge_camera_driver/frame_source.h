@@ -39,7 +39,7 @@ struct CameraStatus {
   uint64_t timeouts = 0;
   uint64_t connections = 0;  ///< number of times the device was opened
   std::optional<double> exposure_s;
-  /// Frames per second of the kernel's clock since the device was opened, from numbers and stamps.
+  /// Frames per second of the kernel's clock since the frames' numbers began, from numbers and stamps.
   std::optional<double> rate_hz;
 };
 

@@ -38,7 +38,7 @@ struct V4l2FrameSource::Camera {
   Timestamp next_attempt;  // on the monotonic clock, like last_frame
   Timestamp last_frame;
   std::optional<uint32_t> last_sequence;
-  Timestamp first_stamp;  // of the kernel, since the device was opened, like the next member
+  Timestamp first_stamp;  // of the kernel, since the frames' numbers began, like the next member
   uint32_t first_sequence = 0;
   double readout_s = 0.0;
   CameraStatus status;
@@ -151,10 +151,10 @@ bool V4l2FrameSource::take(size_t index, const V4l2Frame& frame, FrameSink* sink
     const std::lock_guard<std::mutex> lock(mutex_);
     CameraStatus& status = camera.status;
     ++(problem.empty() ? status.frames : status.damaged);
-    if (!camera.last_sequence) {
+    if (!camera.last_sequence || frame.sequence <= *camera.last_sequence) {
       camera.first_stamp = frame.monotonic_stamp;
       camera.first_sequence = frame.sequence;
-    } else if (frame.sequence > *camera.last_sequence) {
+    } else {
       status.lost += frame.sequence - *camera.last_sequence - 1;
     }
     const double since_s = toSeconds(frame.monotonic_stamp - camera.first_stamp);
