@@ -140,6 +140,7 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
       }
     }
   });
+  samples_ = std::make_shared<const std::vector<Sample>>(makeSamples());
 }
 
 /// Whether all blocks that bilinear sampling uses at a sensor pixel are valid.
@@ -152,33 +153,44 @@ bool WorkingCamera::isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor
          valid_blocks.at<uint8_t>(below, x) != 0 && valid_blocks.at<uint8_t>(below, right) != 0;
 }
 
+std::vector<WorkingCamera::Sample> WorkingCamera::makeSamples() const {
+  std::vector<Sample> samples;
+  const cv::Size blocks(sensor_size_.width / block_px_, sensor_size_.height / block_px_);
+  for (int y = 0; y < size_.height; ++y) {
+    const auto* sensor = sensor_pixels_.ptr<cv::Vec2f>(y);
+    for (int x = 0; x < size_.width; ++x) {
+      if (sensor[x][0] < 0.0F) {
+        continue;
+      }
+      const float u = blockCoordinate(sensor[x][0], block_px_, blocks.width);
+      const float v = blockCoordinate(sensor[x][1], block_px_, blocks.height);
+      const int left = std::clamp(static_cast<int>(u), 0, std::max(0, blocks.width - 2));
+      const int top = std::clamp(static_cast<int>(v), 0, std::max(0, blocks.height - 2));
+      samples.push_back({y * size_.width + x, top * blocks.width + left, u - static_cast<float>(left),
+                         v - static_cast<float>(top)});
+    }
+  }
+  return samples;
+}
+
 cv::Mat WorkingCamera::undistort(const cv::Mat& pixels) const {
   check(pixels.size() == sensor_size_ && pixels.type() == CV_8UC1,
         "WorkingCamera::undistort: expected CV_8UC1 of the sensor's size");
   // cv::remap rounds coordinates to 1/32 pixel, which would show up in stereo.
-  cv::Mat undistorted(size_, CV_8UC1);
-  const cv::Mat source = block_px_ > 1 ? averageBlocks(pixels, block_px_) : pixels;
-  for (int y = 0; y < size_.height; ++y) {
-    const auto* sensor = sensor_pixels_.ptr<cv::Vec2f>(y);
-    auto* out = undistorted.ptr<uint8_t>(y);
-    for (int x = 0; x < size_.width; ++x) {
-      if (sensor[x][0] < 0.0F) {
-        out[x] = 0;
-        continue;
-      }
-      const float u = blockCoordinate(sensor[x][0], block_px_, source.cols);
-      const float v = blockCoordinate(sensor[x][1], block_px_, source.rows);
-      const int x0 = static_cast<int>(u);
-      const int y0 = static_cast<int>(v);
-      const float a = u - static_cast<float>(x0);
-      const float b = v - static_cast<float>(y0);
-      const int right = x0 < source.cols - 1 ? 1 : 0;
-      const uint8_t* top = source.ptr<uint8_t>(y0) + x0;
-      const uint8_t* bottom = source.ptr<uint8_t>(std::min(y0 + 1, source.rows - 1)) + x0;
-      const float upper = static_cast<float>(top[0]) + a * static_cast<float>(top[right] - top[0]);
-      const float lower = static_cast<float>(bottom[0]) + a * static_cast<float>(bottom[right] - bottom[0]);
-      out[x] = static_cast<uint8_t>(upper + b * (lower - upper) + 0.5F);  // NOLINT: never negative
-    }
+  cv::Mat source = block_px_ > 1 ? averageBlocks(pixels, block_px_) : pixels;
+  if (!source.isContinuous()) {
+    source = source.clone();
+  }
+  cv::Mat undistorted = cv::Mat::zeros(size_, CV_8UC1);
+  const int right = source.cols > 1 ? 1 : 0, below = source.rows > 1 ? source.cols : 0;
+  for (const Sample& sample : *samples_) {
+    const uint8_t* top = source.data + sample.block;
+    const uint8_t* bottom = top + below;
+    const float upper = static_cast<float>(top[0]) + sample.right * static_cast<float>(top[right] - top[0]);
+    const float lower =
+        static_cast<float>(bottom[0]) + sample.right * static_cast<float>(bottom[right] - bottom[0]);
+    undistorted.data[sample.pixel] =
+        static_cast<uint8_t>(upper + sample.down * (lower - upper) + 0.5F);  // NOLINT: never negative
   }
   return undistorted;
 }

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <vector>
+
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/base/options.h"
@@ -47,7 +51,14 @@ class WorkingCamera {
   cv::Mat undistort(const cv::Mat& pixels) const;
 
  private:
+  /// A pixel that shows something: the first of the four blocks it is interpolated from, and the weights of
+  /// the others.
+  struct Sample {
+    int32_t pixel, block;
+    float right, down;
+  };
   bool isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor_pixel) const;
+  std::vector<Sample> makeSamples() const;
 
   MeiCamera model_;
   cv::Size size_;
@@ -55,6 +66,7 @@ class WorkingCamera {
   int block_px_;  // side length of the averaged blocks
   cv::Mat valid_mask_;
   cv::Mat sensor_pixels_;
+  std::shared_ptr<const std::vector<Sample>> samples_;  // by pixel
 };
 
 /// Reconstructs from the rig the working camera that range maps of this model and size were made with. Throws
