@@ -6,6 +6,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "vcharge_core/base/wide_loops.h"
+
 namespace vcharge {
 namespace {
 
@@ -40,6 +42,15 @@ std::vector<Offset> offsetsWithin(double run_m, double cell_size_m, const StepMa
   return offsets;
 }
 
+/// Whether two heights of a pair differ by at least this; not where one of them is unknown (NaN).
+VCHARGE_WIDE_LOOPS bool anyRise(const float* here_m, const float* there_m, int count, float min_rise_m) {
+  int rises = 0;
+  for (int i = 0; i < count; ++i) {
+    rises += std::abs(there_m[i] - here_m[i]) >= min_rise_m ? 1 : 0;
+  }
+  return rises > 0;
+}
+
 /// Sets the height of the cells halfway between the two sides of each step; the highest counts.
 void markSteps(const StepMapperOptions& options, const cv::Mat& ground_m, const cv::Mat& ground_sigma_m,
                StepMap* map) {
@@ -49,6 +60,10 @@ void markSteps(const StepMapperOptions& options, const cv::Mat& ground_m, const 
     for (int row = 0; row + offset.rows < ground_m.rows; ++row) {
       const auto* here_m = ground_m.ptr<float>(row);
       const auto* there_m = ground_m.ptr<float>(row + offset.rows);
+      if (!anyRise(here_m + first_column, there_m + first_column + offset.columns, end_column - first_column,
+                   offset.min_rise_m)) {
+        continue;
+      }
       for (int column = first_column; column < end_column; ++column) {
         const float rise_m = std::abs(there_m[column + offset.columns] - here_m[column]);
         if (!(rise_m >= offset.min_rise_m)) {  // also if one of them is not known
