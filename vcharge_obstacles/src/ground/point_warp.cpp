@@ -42,7 +42,21 @@ VCHARGE_WIDE_LOOPS void project(const Projection& to, const PixelPoints& points,
   }
 }
 
+/// Bilinear; the coordinates have kFractionBits bits behind the point.
+uint8_t interpolate(const cv::Mat& image, int x, int y) {
+  const int a = x & (kOne - 1), b = y & (kOne - 1);
+  const uint8_t* top = image.ptr<uint8_t>(y >> kFractionBits) + (x >> kFractionBits);
+  const uint8_t* bottom = top + image.step;
+  const int upper = top[0] * (kOne - a) + top[1] * a, lower = bottom[0] * (kOne - a) + bottom[1] * a;
+  return static_cast<uint8_t>((upper * (kOne - b) + lower * b + kOne * kOne / 2) >> (2 * kFractionBits));
+}
+
 }  // namespace
+
+WarpedImage unknownImage(cv::Size size) {
+  return {cv::Mat::zeros(size, CV_8UC1), cv::Mat::zeros(size, CV_8UC1),
+          cv::Mat(size, CV_32SC1, cv::Scalar(-1))};
+}
 
 void PixelPoints::reserve(size_t size) {
   pixel.reserve(size);
@@ -64,8 +78,14 @@ PointWarp::PointWarp(const MeiCamera& model, const cv::Mat& valid) : model_(mode
 WarpedImage PointWarp::warp(const cv::Mat& before, const RigidTransform& camera_from_points,
                             const Eigen::Vector3d& center, const PixelPoints& points,
                             float inverse_range_factor, const cv::Rect& rows) const {
-  WarpedImage warped{cv::Mat::zeros(rows.size(), CV_8UC1), cv::Mat::zeros(rows.size(), CV_8UC1),
-                     cv::Mat(rows.size(), CV_32SC1, cv::Scalar(-1))};
+  WarpedImage warped = unknownImage(rows.size());
+  warpAgain(before, camera_from_points, center, points, inverse_range_factor, rows, &warped);
+  return warped;
+}
+
+void PointWarp::warpAgain(const cv::Mat& before, const RigidTransform& camera_from_points,
+                          const Eigen::Vector3d& center, const PixelPoints& points,
+                          float inverse_range_factor, const cv::Rect& rows, WarpedImage* warped) const {
   const Eigen::Matrix3d rotation = camera_from_points.rotationMatrix();
   const Eigen::Vector3d at = static_cast<double>(inverse_range_factor) * (camera_from_points * center);
   Projection to{{},
@@ -83,31 +103,29 @@ WarpedImage PointWarp::warp(const cv::Mat& before, const RigidTransform& camera_
   }
   const int columns = before.cols, offset = rows.y * columns;
   const auto last_column = static_cast<float>(columns - 1), last_row = static_cast<float>(before.rows - 1);
+  uint8_t *image = warped->image.data, *known = warped->known.data;
+  auto* nearest_of = warped->nearest.ptr<int32_t>();
   std::array<float, kBlock> u{}, v{};
   for (size_t first = 0; first < points.size(); first += kBlock) {
     const size_t count = std::min(kBlock, points.size() - first);
     project(to, points, first, count, u.data(), v.data());
     for (size_t i = 0; i < count; ++i) {
-      if (!(u[i] >= 0.0F && v[i] >= 0.0F && u[i] < last_column && v[i] < last_row)) {
-        continue;
+      int nearest = -1;
+      uint8_t value = 0;
+      if (u[i] >= 0.0F && v[i] >= 0.0F && u[i] < last_column && v[i] < last_row) {
+        const auto x = static_cast<int>(u[i] * kOne), y = static_cast<int>(v[i] * kOne);
+        const int candidate = ((y + kOne / 2) >> kFractionBits) * columns + ((x + kOne / 2) >> kFractionBits);
+        if (isValid(candidate)) {
+          nearest = candidate;
+          value = interpolate(before, x, y);
+        }
       }
-      const auto x = static_cast<int>(u[i] * kOne), y = static_cast<int>(v[i] * kOne);
-      const int nearest = ((y + kOne / 2) >> kFractionBits) * columns + ((x + kOne / 2) >> kFractionBits);
-      if (!isValid(nearest)) {
-        continue;
-      }
-      const int a = x & (kOne - 1), b = y & (kOne - 1);
-      const uint8_t* top = before.ptr<uint8_t>(y >> kFractionBits) + (x >> kFractionBits);
-      const uint8_t* bottom = top + before.step;
-      const int upper = top[0] * (kOne - a) + top[1] * a, lower = bottom[0] * (kOne - a) + bottom[1] * a;
       const int pixel = points.pixel[first + i] - offset;
-      warped.image.data[pixel] =
-          static_cast<uint8_t>((upper * (kOne - b) + lower * b + kOne * kOne / 2) >> (2 * kFractionBits));
-      warped.known.data[pixel] = 255;
-      warped.nearest.ptr<int32_t>()[pixel] = nearest;
+      image[pixel] = value;
+      known[pixel] = nearest >= 0 ? 255 : 0;
+      nearest_of[pixel] = nearest;
     }
   }
-  return warped;
 }
 
 }  // namespace vcharge

@@ -29,6 +29,9 @@ struct WarpedImage {
   cv::Mat nearest;  ///< CV_32SC1: row * columns + column of the older image; -1 where it is unknown
 };
 
+/// Nothing is known of it.
+WarpedImage unknownImage(cv::Size size);
+
 /// Samples images of one camera where they show points that another image of it shows. Immutable.
 class PointWarp {
  public:
@@ -43,6 +46,10 @@ class PointWarp {
   WarpedImage warp(const cv::Mat& before, const RigidTransform& camera_from_points,
                    const Eigen::Vector3d& center, const PixelPoints& points, float inverse_range_factor,
                    const cv::Rect& rows) const;
+  /// The same in the memory of an image of the rows' size that is unknown, or was warped for the same pixels.
+  void warpAgain(const cv::Mat& before, const RigidTransform& camera_from_points,
+                 const Eigen::Vector3d& center, const PixelPoints& points, float inverse_range_factor,
+                 const cv::Rect& rows, WarpedImage* warped) const;
 
  private:
   const MeiCamera model_;

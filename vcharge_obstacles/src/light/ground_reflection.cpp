@@ -111,18 +111,21 @@ cv::Mat unexplainedByReflection(const PointWarp& warp, const LevelView& now, con
       }
     }
   }
-  const auto lookUp = [&](const LevelView& view, const PixelPoints& rays, float inverse_range) {
-    return warp.warp(view.image, view.level_from_camera.inverse(), now.level_from_camera.translation(), rays,
-                     inverse_range, rows);
+  const auto lookUp = [&](const LevelView& view, const PixelPoints& rays, float inverse_range,
+                          WarpedImage* seen) {
+    warp.warpAgain(view.image, view.level_from_camera.inverse(), now.level_from_camera.translation(), rays,
+                   inverse_range, rows, seen);
   };
+  WarpedImage mirrored = unknownImage(rows.size()), mirrored_before = unknownImage(rows.size()),
+              itself_before = unknownImage(rows.size());
   cv::Mat change = cv::Mat::zeros(difference.size(), CV_32FC1), motion = change.clone();
   for (const float part : kRangeParts) {
     here.mirror(part);
     there.mirror(part);
-    const WarpedImage mirrored = lookUp(now, here.rays, 0.0F),
-                      mirrored_before = lookUp(before, there.rays, 0.0F);
+    lookUp(now, here.rays, 0.0F, &mirrored);
+    lookUp(before, there.rays, 0.0F, &mirrored_before);
     // What is mirrored stands: it does not differ from itself before.
-    const WarpedImage itself_before = lookUp(before, here.rays, part);
+    lookUp(before, here.rays, part, &itself_before);
     for (size_t i = 0; i < here.part.size(); ++i) {
       const int at = here.rays.pixel[i] - first_pixel, in_border = inBorder(at);
       const bool is_known = mirrored.known.data[at] != 0 && mirrored_before.known.data[at] != 0 &&
