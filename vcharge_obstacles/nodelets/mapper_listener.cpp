@@ -14,6 +14,7 @@
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_ros/object_conversions.h"
+#include "vcharge_ros/prompt_subscription.h"
 
 namespace vcharge {
 
@@ -43,7 +44,7 @@ void MapperListener::subscribeSchedule(ros::NodeHandle* node, const CameraRig& r
   for (const RigCamera& camera : rig.cameras) {
     names.push_back(camera.name);
   }
-  const boost::function<void(const Pointer&)> note = [this, names, kTopic](const Pointer& message) {
+  const auto note = [this, names, kTopic](const Pointer& message) {
     guard_->run([&] {
       if (message->header.stamp.isZero()) {
         throw InputError(std::string(kTopic) + ": expected a stamp in the header, got 0");
@@ -55,13 +56,13 @@ void MapperListener::subscribeSchedule(ros::NodeHandle* node, const CameraRig& r
       on_schedule_(toTimestamp(message->header.stamp), cameras);
     });
   };
-  subscribers_.push_back(node->subscribe<vcharge_msgs::ScheduledCameras>(kTopic, queue_size, note));
+  subscribers_.push_back(subscribePromptly<vcharge_msgs::ScheduledCameras>(node, kTopic, queue_size, note));
 }
 
 void MapperListener::subscribeObjects(ros::NodeHandle* node, uint32_t queue_size) {
   using Pointer = vcharge_msgs::TrackedObjectsConstPtr;
   constexpr char kTopic[] = "/obstacles/objects";
-  const boost::function<void(const Pointer&)> note = [this, kTopic](const Pointer& message) {
+  const auto note = [this, kTopic](const Pointer& message) {
     guard_->run([&] {
       if (message->header.stamp.isZero() || message->header.frame_id != "odom") {
         throw InputError(std::string(kTopic) +
@@ -71,14 +72,14 @@ void MapperListener::subscribeObjects(ros::NodeHandle* node, uint32_t queue_size
       on_objects_(toTimestamp(message->header.stamp), fromMessage(*message, kTopic));
     });
   };
-  subscribers_.push_back(node->subscribe<vcharge_msgs::TrackedObjects>(kTopic, queue_size, note));
+  subscribers_.push_back(subscribePromptly<vcharge_msgs::TrackedObjects>(node, kTopic, queue_size, note));
 }
 
 template <class Message>
 void MapperListener::subscribe(ros::NodeHandle* node, size_t camera_index, const std::string& topic,
                                uint32_t queue_size) {
   using Pointer = boost::shared_ptr<const Message>;
-  const boost::function<void(const Pointer&)> note = [this, camera_index, topic](const Pointer& message) {
+  const auto note = [this, camera_index, topic](const Pointer& message) {
     guard_->run([&] {
       if (message->header.stamp.isZero()) {
         throw InputError(topic + ": expected a stamp in the message's header, got 0");
@@ -88,7 +89,7 @@ void MapperListener::subscribe(ros::NodeHandle* node, size_t camera_index, const
                 [message, topic] { return toImage(message, topic).pixels; });
     });
   };
-  subscribers_.push_back(node->subscribe<Message>(topic, queue_size, note));
+  subscribers_.push_back(subscribePromptly<Message>(node, topic, queue_size, note));
 }
 
 }  // namespace vcharge

@@ -10,6 +10,7 @@
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
+#include "vcharge_ros/prompt_subscription.h"
 
 namespace vcharge {
 namespace {
@@ -111,7 +112,7 @@ template <class Message>
 void RangeMapSubscriber::subscribe(ros::NodeHandle* node, const std::string& topic, uint32_t queue_size,
                                    boost::shared_ptr<const Message> RangeMapParts::*part) {
   using Pointer = boost::shared_ptr<const Message>;
-  const boost::function<void(const Pointer&)> add = [this, part](const Pointer& message) {
+  const auto add = [this, part](const Pointer& message) {
     RangeMapParts& parts = incomplete_[message->header.stamp];
     parts.*part = message;
     if (parts.complete()) {
@@ -123,7 +124,7 @@ void RangeMapSubscriber::subscribe(ros::NodeHandle* node, const std::string& top
       incomplete_.erase(incomplete_.begin());
     }
   };
-  subscribers_.push_back(node->subscribe<Message>(topic, queue_size, add));
+  subscribers_.push_back(subscribePromptly<Message>(node, topic, queue_size, add));
 }
 
 }  // namespace vcharge

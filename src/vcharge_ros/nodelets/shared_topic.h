@@ -9,6 +9,8 @@
 #include <ros/node_handle.h>
 #include <boost/shared_ptr.hpp>
 
+#include "vcharge_ros/prompt_subscription.h"
+
 namespace vcharge::internal {
 
 /// Publishes on a topic unless another node publishes the same there. It subscribes to its own topic: roscpp
@@ -26,9 +28,8 @@ class SharedTopic {
               std::function<bool(const Message&)> conflicts)
       : conflicts_(std::move(conflicts)) {
     publisher_ = node->advertise<Message>(topic, queue_size);
-    subscriber_ = node->subscribe<Message>(topic, queue_size,
-                                           boost::function<void(const MessageConstPtr&)>(
-                                               [this](const MessageConstPtr& message) { listen(message); }));
+    subscriber_ = subscribePromptly<Message>(node, topic, queue_size,
+                                             [this](const MessageConstPtr& message) { listen(message); });
   }
 
   /// True while another node publishes.

@@ -14,6 +14,7 @@
 #include "vcharge_ros/live_drive_source.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
+#include "vcharge_ros/prompt_subscription.h"
 
 namespace vcharge {
 
@@ -88,12 +89,10 @@ class Nodelet : public nodelet::Nodelet {
   template <class Message>
   void subscribe(const std::string& topic, uint32_t queue_size,
                  std::function<void(const boost::shared_ptr<const Message>&)> callback) {
-    subscribers_.push_back(node().template subscribe<Message>(
-        topic, queue_size,
-        boost::function<void(const boost::shared_ptr<const Message>&)>(
-            [this, callback](const boost::shared_ptr<const Message>& message) {
-              guard_.run([&] { callback(message); });
-            })));
+    subscribers_.push_back(subscribePromptly<Message>(
+        &node(), topic, queue_size, [this, callback](const boost::shared_ptr<const Message>& message) {
+          guard_.run([&] { callback(message); });
+        }));
   }
   /// Adds a status named after the nodelet and `suffix` ("/pose") to /diagnostics. With Threads::kOne, report
   /// is called between two callbacks; with kSeveral, at any time.

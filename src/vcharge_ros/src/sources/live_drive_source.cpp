@@ -14,6 +14,7 @@
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_item.h"
 #include "vcharge_ros/image_conversions.h"
+#include "vcharge_ros/prompt_subscription.h"
 #include "vcharge_ros/stamp_sorter.h"
 
 namespace vcharge {
@@ -88,8 +89,7 @@ template <class Message>
 void LiveDriveSource::Implementation::subscribeTopic(
     const std::string& topic, int queue_size,
     std::function<void(const boost::shared_ptr<const Message>&)> callback) {
-  subscribers.push_back(node.subscribe<Message>(topic, queueSize(queue_size), std::move(callback),
-                                                ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  subscribers.push_back(subscribePromptly<Message>(&node, topic, queueSize(queue_size), std::move(callback)));
 }
 
 void LiveDriveSource::Implementation::subscribeImages(size_t camera) {

@@ -76,7 +76,7 @@ class Listener:
         rospy.init_node("measure_online", anonymous=True, disable_signals=True)
 
         def subscribe(topic, kind, take):
-            self.subscribers.append(rospy.Subscriber(topic, get_message_class(kind), take, queue_size=None))
+            self.subscribers.append(rospy.Subscriber(topic, get_message_class(kind), take, queue_size=None, tcp_nodelay=True))
 
         # camera_info is published with each image, and is small.
         subscribe(f"/camera/{cameras[0]}/camera_info", "sensor_msgs/CameraInfo", lambda message: self.take(self.images, message))
