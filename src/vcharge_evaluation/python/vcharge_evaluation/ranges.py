@@ -21,14 +21,17 @@ SETTINGS = {
     "filled from two levels": ("default", {"num_fill_levels": 2}),
     "all planes": ("default", {"coarse_pass": False}),
 }
+# Sweeps that do not remember the last range map: what they search instead, and their options.
+FORGETFUL = {"a coarse pass": {}, "all planes": {"coarse_pass": False}}
 
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "range_evaluation")
-    parser.add_argument("--parts", nargs="*", default=["drive"], choices=["drive", "settings", "other_day", "online"],
+    parser.add_argument("--parts", nargs="*", default=["drive"], choices=["drive", "settings", "other_day", "online", "remembering"],
                         help="drive: four cameras on 4 s in a lot; settings: two cameras on 1.7 s each in lot and garage; "
-                        "other_day: four cameras by camera and distance; online: the same as on the car, causal, with its options")
+                        "other_day: four cameras by camera and distance; online: the same as on the car, causal, with its options; "
+                        "remembering: what the sweep that remembers loses against sweeps that do not")
     parser.add_argument("--drives", nargs="*", default=["lot:5", "garage:6"], help="scene:seed of the other parts' drives")
     parser.add_argument("--duration-s", type=float, default=1.7, help="duration of these drives")
     parser.add_argument("--image-scale", type=float, default=1.0, help="image size of the drives of another day over 1280x800")
@@ -119,6 +122,31 @@ def evaluate_online(args, results):
         results.add(f"On the car, image scale {args.image_scale:g}",
                     *((f"{scene} {seed}, {label}", [*errors.figures(label), *errors.near_figures(label)])
                       for label in errors.sets if label != "all cameras"))
+
+
+def evaluate_remembering(args, results):
+    """Range maps as on the car against those of sweeps that search every range map in full."""
+    options = yaml.safe_load((CONFIG / "dense_obstacles.yaml").read_text())
+    for drive in args.drives:
+        scene, seed = drive.split(":")
+        made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
+        rig = found_masks(args.work, scene).rig_of(made.folder)
+        found = RangeErrors(made, rig, "online", *AS_ON_THE_CAR)
+        for name, sweep in FORGETFUL.items():
+            path = made.folder / f"{name.replace(' ', '_')}.yaml"
+            path.write_text(yaml.safe_dump({**options, "remember": False,
+                                            "plane_sweep": {**options.get("plane_sweep", {}), **sweep}}))
+            other = RangeErrors(made, rig, f"online_{path.stem}", "--online", "--options", path)
+            results.add(f"Remembering against {name}, image scale {args.image_scale:g}",
+                        *((f"{scene} {seed}, {label}", list(losses(found, other, label))) for label in found.sets))
+
+
+def losses(found, other, label):
+    """Relative differences of the figures that are better the larger they are."""
+    before = {one.name: one.value for one in other.figures(label)}
+    for one in found.figures(label):
+        if one.name.startswith(("pixels with", "within 5 %")):
+            yield figure(one.name, 100 * (one.value / before[one.name] - 1), "%", at_least=-3)
 
 
 def evaluate_drive(args, results):
