@@ -17,7 +17,7 @@ namespace vcharge {
 /// Processor time of the calling thread, in seconds.
 double threadProcessorTime_s();
 
-/// Gives the calling thread, and those that it starts, a ninth of the weight of other threads. Without effect
+/// Gives the calling thread, and those that it starts, a third of the weight of other threads. Without effect
 /// where the system does not allow it.
 void letOthersGoFirst();
 

@@ -36,6 +36,7 @@ STAGES = {
     "range maps": ["RangeMapper::", "PlaneSweep::", "SweepLevel::", "TileScorer::", "MotionRefinement::", "ScheduledSweeps::"],
 }
 QUIET_S = 5.0  # without a message the drive is over
+BUDGET_WARNING = "the processor budget does not suffice"  # of StageSchedule
 
 
 def arguments():
@@ -68,7 +69,7 @@ class Listener:
     def __init__(self, cameras):
         import rospy
         from roslib.message import get_message_class
-        self.images, self.lost = {}, {}
+        self.images, self.lost, self.short_of_time = {}, {}, set()
         self.topics = {f"/dense/{camera}/range/camera_info": "sensor_msgs/CameraInfo" for camera in cameras} | RESULTS
         self.results = {topic: {} for topic in self.topics}
         self.lock, self.last_s = threading.Lock(), time.monotonic()
@@ -93,6 +94,8 @@ class Listener:
     def take_diagnostics(self, message):
         with self.lock:
             for status in message.status:
+                if BUDGET_WARNING in status.message:
+                    self.short_of_time.add(status.name.partition(":")[0])
                 self.lost[status.name] = {pair.key: pair.value for pair in status.values
                                           if pair.key.startswith("dropped") or pair.key.endswith("left_out")}
 
@@ -123,6 +126,7 @@ def figures_of(listener, usage, rate):
     for name, lost in sorted(listener.lost.items()):
         for key, value in lost.items():
             yield Figure(f"{name}: {key}", int(value))
+    yield Figure("stages that warn that their budget does not suffice", ", ".join(sorted(listener.short_of_time)) or "none")
     yield Figure("manager: processor seconds per second", usage.load)
     yield Figure("manager: memory, largest", usage.peak_mb, "MB")
 
