@@ -1,4 +1,4 @@
-"""Long drives from short ones: one place after the other, each once more with inverted gray levels, which shows other features."""
+"""Long drives from short ones: one place after the other, each several times with other gray levels, which show other features."""
 import copy
 
 import numpy as np
@@ -9,6 +9,14 @@ from vcharge_evaluation.poses import pose_of, transform
 
 # From the end of one place to the start of the next, so far away, the car sees nothing: its images are black.
 SPACING_M, GAP_S, GAP_STEP_S, BLACK_IMAGES_STEP_S = 100.0, 8.0, 0.02, 1.0
+
+
+def gray_levels():
+    """Tables of gray levels that are continuous and order the pixels differently: the levels go up and down so many times."""
+    levels = np.arange(256)
+    for num_slopes in (1, 2, 3):
+        rising = 255 - np.abs(255 - num_slopes * levels % 510)
+        yield from (rising.astype(np.uint8), (255 - rising).astype(np.uint8))
 
 
 def planar(x_m, y_m, yaw_rad):
@@ -45,8 +53,8 @@ def later(original, shift_s):
 class Place:
     """A drive through one place: its messages and its truth."""
 
-    def __init__(self, drive, inverted):
-        self.inverted = inverted
+    def __init__(self, drive):
+        self.levels = np.arange(256, dtype=np.uint8)
         with rosbag.Bag(str(drive.bag)) as bag:
             self.messages = [(topic, message) for topic, message, _ in bag.read_messages()
                              if topic == "/odom" or topic.endswith("/image_raw")]
@@ -58,14 +66,19 @@ class Place:
         self.duration_s = odometry[-1].header.stamp.to_sec() - self.start_s
         self.truth = np.loadtxt(drive.trajectory)
 
+    def with_levels(self, levels):
+        """The same place with other gray levels; the messages are shared."""
+        place = copy.copy(self)
+        place.levels = levels
+        return place
+
     def true_pose(self, row):
         """World from vehicle, as a planar pose."""
         return planar(*planar_values(transform(self.truth[row, 1:4], self.truth[row, 4:8])))
 
     def image(self, original, shift_s):
         message = later(original, shift_s)
-        if self.inverted:
-            message.data = (255 - np.frombuffer(message.data, np.uint8)).tobytes()
+        message.data = self.levels[np.frombuffer(message.data, np.uint8)].tobytes()
         return message
 
 

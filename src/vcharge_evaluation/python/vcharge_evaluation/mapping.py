@@ -9,7 +9,7 @@ import yaml
 
 from vcharge_evaluation import tools
 from vcharge_evaluation.drives import LOOP_STEP, Drive
-from vcharge_evaluation.long_drives import Place, join
+from vcharge_evaluation.long_drives import Place, gray_levels, join
 from vcharge_evaluation.poses import at_stamps, rotations, write_odometry
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, import_published_images, judge, simulate
@@ -170,10 +170,10 @@ def evaluate_growth(args, results):
     """A drive through one, two, four, ... places, none of them twice, with mapping's time and memory over its length."""
     drives = [Drive(args.work, "growth", "--scene", "lot", "--drive", "loop", "--scene-seed", seed, "--seed", seed, "--image-step",
                     LOOP_STEP, "--image-scale", args.growth_scale) for seed in args.growth_seeds]
-    places = [Place(drive, inverted) for inverted in (False, True) for drive in drives]
+    lots = [Place(drive) for drive in drives]
+    places = [lot.with_levels(levels) for levels in gray_levels() for lot in lots]
     columns, lengths, builds = [], [], []
-    count = 1
-    while count <= len(places):
+    for count in [*(2**i for i in range(len(places).bit_length() - 1)), len(places)]:
         folder = args.work / "growth" / f"{count}_places"
         length_m, drive_s = join(places[:count], folder)
         build = tools.build_map(folder, "map", rig=drives[0].true_rig, options=args.options)
@@ -188,7 +188,6 @@ def evaluate_growth(args, results):
             Figure("peak memory", build.peak_gb, "GB"),
             Figure("map file", (folder / "map.vmap").stat().st_size * 1e-6, "MB")]))
         (folder / "drive.bag").unlink()
-        count *= 2
     title = f"Growth with the drive, image scale {args.growth_scale:g}"
     results.add(title, *columns)
     results.add(f"{title}: linear fit over the length", ("R2", [
