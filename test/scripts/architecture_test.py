@@ -24,6 +24,7 @@ KNOWS_ROS = {"vcharge_ros", "vcharge_recordings"}  # libraries of these may incl
 ROS_HEADER = re.compile(r"#\s*include <((?:ros|rosbag|nodelet|pluginlib|tf2_ros|tf2|diagnostic_updater|std_srvs|"
                         r"octomap_msgs|\w+_msgs)/[^>]+)>")
 OWN_HEADER = re.compile(r'#\s*include "((vcharge_\w+)/[^"]+)"')
+NODE_SUBSCRIBES = re.compile(r"(?:\.|->)(?:template )?subscribe<")
 RIDDLE = re.compile(r"^\s*//[/!]?<?\s*(Of|And|That|Which|Else|Whom)\b|\S.*\s///?<?\s+(of|which|whom)\b")
 
 MAX_FILE_LINES = 400
@@ -120,6 +121,12 @@ class ArchitectureTest(unittest.TestCase):
                 if re.fullmatch(r"roscpp|rosbag|nodelet|vcharge_ros|.*_msgs|tf2.*", name):
                     findings.append(f"{relative(path)}: {name}")
         self.check(findings, "ROS packages")
+
+    def test_subscriptions_ask_for_prompt_messages(self):
+        """The first subscription of a process to a topic decides for all of them whether messages are held back."""
+        findings = [relative(path) for path in tracked("*.h", "*.cpp")
+                    if path.name != "prompt_subscription.h" and NODE_SUBSCRIBES.search(path.read_text(encoding="utf-8"))]
+        self.check(findings, "subscriptions that are not made by subscribePromptly()")
 
     def test_files_and_folders_have_one_job(self):
         findings = [f"{relative(path)}: {lines(path)} lines" for path in self.sources + tracked("*.py")
