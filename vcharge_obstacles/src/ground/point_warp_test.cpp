@@ -61,6 +61,16 @@ TEST_F(PointWarpTest, ShiftsAPlaneByItsParallax) {
   expectShift(warp.warp(before_, before_from_now, Eigen::Vector3d::Zero(), planeAt(2.0), 0.0F, all_), 0, 0);
 }
 
+TEST_F(PointWarpTest, AUsedImageKeepsNothing) {
+  const RigidTransform before_from_now(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2, 0.08, 0.0));
+  const PointWarp warp(kPinhole, valid_);
+  WarpedImage warped =
+      warp.warp(before_, RigidTransform(), Eigen::Vector3d::Zero(), planeAt(2.0), 1.0F, all_);
+  warp.warpAgain(before_, before_from_now, Eigen::Vector3d::Zero(), planeAt(2.0), 1.0F, all_, &warped);
+  expectShift(warped, 5, 2);
+  EXPECT_EQ(warped.image.at<uint8_t>(29, 39), 0);  // seen the first time alone
+}
+
 TEST_F(PointWarpTest, RaysMayStartElsewhere) {
   // Rays that start 0.2 m to the right of the camera.
   const PointWarp warp(kPinhole, valid_);
