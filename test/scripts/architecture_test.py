@@ -125,7 +125,7 @@ class ArchitectureTest(unittest.TestCase):
     def test_subscriptions_ask_for_prompt_messages(self):
         """The first subscription of a process to a topic decides for all of them whether messages are held back."""
         findings = [relative(path) for path in tracked("*.h", "*.cpp")
-                    if path.name != "prompt_subscription.h" and NODE_SUBSCRIBES.search(path.read_text(encoding="utf-8"))]
+                    if path.name != "nodelet_support.h" and NODE_SUBSCRIBES.search(path.read_text(encoding="utf-8"))]
         self.check(findings, "subscriptions that are not made by subscribePromptly()")
 
     def test_files_and_folders_have_one_job(self):

@@ -14,7 +14,6 @@
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_ros/object_conversions.h"
-#include "vcharge_ros/prompt_subscription.h"
 
 namespace vcharge {
 

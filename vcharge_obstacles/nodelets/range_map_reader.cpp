@@ -10,7 +10,6 @@
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
-#include "vcharge_ros/prompt_subscription.h"
 
 namespace vcharge {
 namespace {

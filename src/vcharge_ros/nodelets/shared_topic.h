@@ -9,7 +9,7 @@
 #include <ros/node_handle.h>
 #include <boost/shared_ptr.hpp>
 
-#include "vcharge_ros/prompt_subscription.h"
+#include "vcharge_ros/nodelet_support.h"
 
 namespace vcharge::internal {
 

@@ -14,7 +14,6 @@
 #include "vcharge_ros/live_drive_source.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
-#include "vcharge_ros/prompt_subscription.h"
 
 namespace vcharge {
 

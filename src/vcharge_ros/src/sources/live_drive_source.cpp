@@ -14,7 +14,7 @@
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_item.h"
 #include "vcharge_ros/image_conversions.h"
-#include "vcharge_ros/prompt_subscription.h"
+#include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/stamp_sorter.h"
 
 namespace vcharge {
