@@ -29,7 +29,7 @@ struct WarpedImage {
   cv::Mat nearest;  ///< CV_32SC1: row * columns + column of the older image; -1 where it is unknown
 };
 
-/// Nothing is known of it.
+/// An image of which nothing is known.
 WarpedImage unknownImage(cv::Size size);
 
 /// Samples images of one camera where they show points that another image of it shows. Immutable.
