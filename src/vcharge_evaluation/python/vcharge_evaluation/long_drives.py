@@ -12,7 +12,7 @@ SPACING_M, GAP_S, GAP_STEP_S, BLACK_IMAGES_STEP_S = 100.0, 8.0, 0.02, 1.0
 
 
 def gray_levels():
-    """Tables of gray levels that are continuous and order the pixels differently: the levels go up and down so many times."""
+    """Tables of gray levels that order the pixels differently. Continuous: each goes up and down in one to three slopes."""
     levels = np.arange(256)
     for num_slopes in (1, 2, 3):
         rising = 255 - np.abs(255 - num_slopes * levels % 510)

@@ -91,12 +91,17 @@ def relative_errors(errors):
     yield Figure("the same, worst", 100 * spread["max"], "%")
 
 
-def evaluate_other_day(args, results):
-    """All cameras on another day, by camera, by distance and by confidence."""
+def other_day_drives(args):
+    """Scene, seed, drive and masks of each of the drives, on another day."""
     for drive in args.drives:
         scene, seed = drive.split(":")
-        masks = found_masks(args.work, scene)
-        made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
+        yield (scene, seed, other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s),
+               found_masks(args.work, scene))
+
+
+def evaluate_other_day(args, results):
+    """All cameras on another day, by camera, by distance and by confidence."""
+    for scene, seed, made, masks in other_day_drives(args):
         errors = RangeErrors(made, masks.rig_of(made.folder), "ranges")
         size = f"image scale {args.image_scale:g}"
         results.add(f"By camera, {size}", *((f"{scene} {seed}, {label}", [
@@ -115,10 +120,8 @@ def evaluate_other_day(args, results):
 
 def evaluate_online(args, results):
     """All cameras as on the car: from earlier images only, with the options of the obstacles' launch file."""
-    for drive in args.drives:
-        scene, seed = drive.split(":")
-        made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
-        errors = RangeErrors(made, found_masks(args.work, scene).rig_of(made.folder), "online", *AS_ON_THE_CAR)
+    for scene, seed, made, masks in other_day_drives(args):
+        errors = RangeErrors(made, masks.rig_of(made.folder), "online", *AS_ON_THE_CAR)
         results.add(f"On the car, image scale {args.image_scale:g}",
                     *((f"{scene} {seed}, {label}", [*errors.figures(label), *errors.near_figures(label)])
                       for label in errors.sets if label != "all cameras"))
@@ -127,10 +130,8 @@ def evaluate_online(args, results):
 def evaluate_remembering(args, results):
     """Range maps as on the car against those of sweeps that search every range map in full."""
     options = yaml.safe_load((CONFIG / "dense_obstacles.yaml").read_text())
-    for drive in args.drives:
-        scene, seed = drive.split(":")
-        made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
-        rig = found_masks(args.work, scene).rig_of(made.folder)
+    for scene, seed, made, masks in other_day_drives(args):
+        rig = masks.rig_of(made.folder)
         found = RangeErrors(made, rig, "online", *AS_ON_THE_CAR)
         for name, sweep in FORGETFUL.items():
             path = made.folder / f"{name.replace(' ', '_')}.yaml"
@@ -142,11 +143,12 @@ def evaluate_remembering(args, results):
 
 
 def losses(found, other, label):
-    """Relative differences of the figures that are better the larger they are."""
+    """Relative differences of the figures that are better the larger they are; None where the other sweep has nothing."""
     before = {one.name: one.value for one in other.figures(label)}
     for one in found.figures(label):
         if one.name.startswith(("pixels with", "within 5 %")):
-            yield figure(one.name, 100 * (one.value / before[one.name] - 1), "%", at_least=-3)
+            reference = before[one.name]
+            yield figure(one.name, 100 * (one.value / reference - 1) if reference else None, "%", at_least=-3)
 
 
 def evaluate_drive(args, results):
