@@ -22,7 +22,7 @@ namespace vcharge {
 /// images, and object_nodelet's objects. Publishes the topics of ObstaclePublisher and a status per camera in
 /// /diagnostics. Callbacks only queue messages; a thread processes them. Parameters: ~rig (path), ~options
 /// (ObstacleMapperOptions; fixed_frame: map needs map -> odom on /tf), ~odometry_topic, ~lossless_replay
-/// (every range map in order, however late; otherwise those that wait too long are dropped).
+/// (range maps in order, however late; cameras may lag by 25 stamps; otherwise late ones are dropped).
 class ObstacleNodelet : public Nodelet {
  public:
   ObstacleNodelet() : Nodelet("obstacles") {}

@@ -155,6 +155,7 @@ bool WorkingCamera::isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor
 
 std::vector<WorkingCamera::Sample> WorkingCamera::makeSamples() const {
   std::vector<Sample> samples;
+  samples.reserve(static_cast<size_t>(size_.area()));
   const cv::Size blocks(sensor_size_.width / block_px_, sensor_size_.height / block_px_);
   for (int y = 0; y < size_.height; ++y) {
     const auto* sensor = sensor_pixels_.ptr<cv::Vec2f>(y);
