@@ -55,9 +55,10 @@ void summarize(const Arguments& arguments, const SummaryOptions& options, nlohma
   std::cout << "landmarks: " << report.num_landmarks << " of " << report.num_landmarks_before << " ("
             << 100.0 * ratio
             << " %)\ndeviation of a pose over that with all landmarks: " << report.median_sigma_factor
-            << " (median), " << report.worst_sigma_factor
-            << " (worst)\nlandmarks that a frame of another drive is expected to find: "
-            << report.median_num_found << " (median), with all landmarks " << report.median_num_found_before
+            << " (median), " << report.worst_sigma_factor << " (worst), " << report.mean_sigma_factor
+            << " (mean; with any choice of as many at least " << report.least_sigma_factor
+            << ")\nlandmarks that a frame of another drive is expected to find: " << report.median_num_found
+            << " (median), with all landmarks " << report.median_num_found_before
             << "\nfile: " << kilobytes_per_100_m << " kB per 100 m of drive\nverdict: " << verdict
             << (remark.empty() ? "" : "\n  " + remark) << "\ncontent hash: " << summary.map->contentHash()
             << "\n";
@@ -65,6 +66,8 @@ void summarize(const Arguments& arguments, const SummaryOptions& options, nlohma
             {"num_landmarks_before", report.num_landmarks_before},
             {"median_sigma_factor", report.median_sigma_factor},
             {"worst_sigma_factor", report.worst_sigma_factor},
+            {"mean_sigma_factor", report.mean_sigma_factor},
+            {"least_sigma_factor", report.least_sigma_factor},
             {"median_num_found", report.median_num_found},
             {"median_num_found_before", report.median_num_found_before},
             {"kilobytes_per_100_m", kilobytes_per_100_m},
@@ -84,6 +87,7 @@ int main(int argc, char** argv) {
   addShowOptions(&app, &arguments.show_options);
   app.setFooter(
       "Keys of --json: num_landmarks, num_landmarks_before, median_sigma_factor, worst_sigma_factor, "
+      "mean_sigma_factor, least_sigma_factor (of any choice of as many landmarks), "
       "median_num_found (landmarks that a frame of another drive is expected to find), "
       "median_num_found_before "
       "(with all landmarks), kilobytes_per_100_m, verdict (GOOD, CHECK), remarks, content_hash.");

@@ -24,6 +24,9 @@ struct SummaryReport {
   size_t num_landmarks_before = 0, num_landmarks = 0;
   /// Deviation of the position over that with all landmarks, of keyframes.
   double median_sigma_factor = 1.0, worst_sigma_factor = 1.0;
+  /// The same as geometric mean, and what it is at least, whichever as many landmarks are chosen: how far the
+  /// greedy choice can be from the best.
+  double mean_sigma_factor = 1.0, least_sigma_factor = 1.0;
   /// Landmarks that a frame of another drive is expected to find at a keyframe, of the median keyframe.
   double median_num_found_before = 0.0, median_num_found = 0.0;
 };

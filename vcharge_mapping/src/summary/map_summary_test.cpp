@@ -48,6 +48,24 @@ TEST(MapSummaryTest, KeepsEnoughLandmarksAtEachPlaceOrNoMoreThanAsked) {
   EXPECT_LT(least.median_num_found, summary.report.median_num_found);
 }
 
+// The greedy choice is close to the best: the bound of any choice lies less than a tenth below it.
+TEST(MapSummaryTest, BoundsWhatAnyChoiceReaches) {
+  const auto map = testing::makeWorld(1);
+  SummaryOptions options;
+  options.max_sigma_factor = 1.0;
+  options.min_found_per_frame = 0.0;
+  double last = 1e9;
+  for (const double ratio : {0.25, 0.5, 0.75, 1.0}) {
+    options.max_landmark_ratio = ratio;
+    const SummaryReport report = summarizeMap(*map, options).report;
+    EXPECT_LE(report.least_sigma_factor, report.mean_sigma_factor);
+    EXPECT_GT(report.least_sigma_factor, 0.9 * report.mean_sigma_factor) << ratio;
+    EXPECT_LT(report.mean_sigma_factor, last);
+    last = report.mean_sigma_factor;
+  }
+  EXPECT_NEAR(last, 1.0, 1e-9);
+}
+
 // At a place of two drives, a frame may find what either of them saw.
 TEST(MapSummaryTest, CountsWhatAnotherDriveSawAtThePlace) {
   const auto world = testing::makeWorld(1);

@@ -202,6 +202,8 @@ def summary(lot, results):
         columns.append((name, [Figure("landmarks", found["num_landmarks"]),
                                Figure("file per 100 m of drive", found["kilobytes_per_100_m"] / 1e3, "MB"),
                                Figure("deviation of a pose over that with all, worst", found["worst_sigma_factor"]),
+                               Figure("the same, mean", found["mean_sigma_factor"]),
+                               Figure("the same, of any choice of as many landmarks at least", found["least_sigma_factor"]),
                                *localization_figures(result, 100 * whole.ratio() - 1.0, most_cm)]))
     results.add(f"Summaries, lot {lot.seed}, image scale {lot.args.image_scale:g}", *columns)
 
