@@ -60,7 +60,8 @@ class LivingMap(Map):
         return [Figure("drives in the map", len(self.components)), Figure("keyframes", len(self.positions)),
                 Figure("landmarks", self.num_landmarks), Figure("file", self.path.stat().st_size / 1e6, "MB"),
                 figure("position of the keyframes, root mean square", 100 * float(np.sqrt((errors_m ** 2).mean())), "cm",
-                       at_most=4)]
+                       at_most=4),
+                figure("scale error (absolute)", 100 * abs(self.scale - 1), "%", at_most=0.1)]
 
 
 def recording_of(map_path):

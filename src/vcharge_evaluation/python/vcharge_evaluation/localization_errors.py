@@ -32,6 +32,9 @@ class Map:
         centre, true_centre = self.positions.mean(0), self.true_positions.mean(0)
         u, _, v = np.linalg.svd((self.true_positions - true_centre).T @ (self.positions - centre))
         self.turn = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+        # The map's lengths over the true ones.
+        turned, true = (self.positions - centre) @ self.turn.T, self.true_positions - true_centre
+        self.scale = float((turned * true).sum() / (true ** 2).sum())
         self.shift = true_centre - self.turn @ centre
 
     def carry(self, positions, turns):
