@@ -57,7 +57,7 @@ class MapRigSteps {
           correctTimeOffset(series_, state_, &result_);
           searchWithAllCameras();
           if (i + 1 == kNumSearches) {
-            priors_.odometry = estimateOdometryNoise(options_.adjustment, *data_);
+            priors_.odometry = estimateOdometryNoise(options_.adjustment.bundle, *data_);
           }
           adjust();
         }

@@ -1,13 +1,11 @@
 #include "rig/rig_adjustment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 
 #include "rig/ground.h"
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/quantile.h"
 #include "vcharge_core/motion/cross_matrix.h"
 
 namespace vcharge {
@@ -16,17 +14,8 @@ namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// Factor on the odometer's standard deviation if the wheels slipped.
-constexpr double kSlipFactor = 20.0;
-constexpr double kSlipSigmas = 5.0;
 /// Larger turns between keyframes tilt the body.
 constexpr double kMinTurn_rad = 0.01;
-// Minimum standard deviations of an odometer.
-constexpr double kMinOdometrySigma_m = 0.0005;
-constexpr double kMinOdometrySigma_rad = 0.0002;
-constexpr double kMinHeightSigma_m = 0.001;
-constexpr double kMinTiltSigma_rad = 0.0005;
-constexpr size_t kMinMotions = 10;
 /// Usual changes of a lens by heat or by focusing: of the focal length, and of the principal point over the
 /// image's width.
 constexpr double kFocalChange = 0.003, kPrincipalPointChange = 0.0015;
@@ -116,14 +105,9 @@ void addTimingDeviations(const RigPriors& priors, const CameraRig& rig, BundlePr
 /// Builds the bundle adjustment with unknown extrinsics, ground observations and priors.
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
                              const ReconstructionData& data) {
-  const OdometryNoise& odometry = priors.odometry;
-  BundleProblem problem = makeBundleProblem(options.bundle, data);
+  BundleProblem problem = makeBundleProblem(options.bundle, data, priors.odometry);
   const std::vector<double> weights = balanceTurns(data);
   for (OdometerFactor& factor : problem.odometer_factors) {
-    if (odometry.isKnown()) {
-      factor.information = odometry.sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
-      factor.information /= odometry.has_slipped[factor.pose] ? kSlipFactor * kSlipFactor : 1.0;
-    }
     factor.information.block<2, 2>(3, 3) *= weights[factor.pose];
   }
   for (const RigCamera& camera : data.rig->cameras) {
@@ -232,44 +216,6 @@ ImageDeviation imageDeviation(const CameraModel& camera, const CameraModel& know
   deviation << std::log(focalLength(camera) / focalLength(known)),
       camera.principalPoint() - known.principalPoint();
   return deviation;
-}
-
-OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data) {
-  OdometryNoise noise;
-  if (data.keyframes.size() <= kMinMotions) {
-    return noise;
-  }
-  std::array<std::vector<double>, 6> errors;
-  for (size_t i = 1; i < data.keyframes.size(); ++i) {
-    const RigidTransform counted =
-        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
-    const RigidTransform seen =
-        data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
-    Vector6d error;
-    error << seen.translation() - counted.translation(), vectorFromRotation(seen.rotation()).head<2>(),
-        yawOfRotation(seen.rotation()) - data.odometry_turn_scale * yawOfRotation(counted.rotation());
-    for (size_t axis = 0; axis < errors.size(); ++axis) {
-      errors[axis].push_back(std::abs(error[static_cast<Eigen::Index>(axis)]));
-    }
-  }
-  const BundleAdjustmentOptions& bundle = options.bundle;
-  Vector6d least, most;
-  least << kMinOdometrySigma_m, kMinOdometrySigma_m, kMinHeightSigma_m, kMinTiltSigma_rad, kMinTiltSigma_rad,
-      kMinOdometrySigma_rad;
-  most << bundle.odometry_sigma_m, bundle.odometry_sigma_m, bundle.height_sigma_m, bundle.tilt_sigma_rad,
-      bundle.tilt_sigma_rad, bundle.odometry_sigma_rad;
-  constexpr double kMedianOfNormal = 0.6745;  // of the absolute value of a standard normal variable
-  for (Eigen::Index axis = 0; axis < 6; ++axis) {
-    noise.sigmas[axis] = std::clamp(quantile(errors[static_cast<size_t>(axis)], 0.5) / kMedianOfNormal,
-                                    least[axis], most[axis]);
-  }
-  noise.has_slipped.push_back(false);
-  for (size_t i = 0; i + 1 < data.keyframes.size(); ++i) {
-    noise.has_slipped.push_back(errors[0][i] > kSlipSigmas * noise.sigmas[0] ||
-                                errors[1][i] > kSlipSigmas * noise.sigmas[1] ||
-                                errors[5][i] > kSlipSigmas * noise.sigmas[5]);
-  }
-  return noise;
 }
 
 BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,

@@ -5,22 +5,10 @@
 #include <Eigen/Core>
 
 #include "vcharge_calibration/rig/rig_adjustment_options.h"
+#include "vcharge_reconstruction/adjustment/odometry_noise.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {
-
-/// Noise of the odometer's motions between keyframes, estimated from the adjusted keyframes.
-struct OdometryNoise {
-  /// Standard deviations along and about x, y, z of the vehicle: forwards, sideways and from the plane of
-  /// motion (m), roll, pitch and turn (rad). Wheels count distances in steps but hardly slip sideways, and a
-  /// body rolls more than it pitches. 0: unknown, the options' values are used.
-  Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Zero();
-  std::vector<bool> has_slipped;  ///< by the later keyframe of a motion: the motion gets little weight
-
-  bool isKnown() const { return sigmas[0] > 0.0; }
-};
-/// Estimates an upper bound from keyframes adjusted with loose odometry: it contains their own errors.
-OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data);
 
 /// Length of parts of a drive whose errors are independent.
 constexpr double kIndependent_m = 10.0;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <random>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -253,46 +252,6 @@ TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
     EXPECT_EQ(parallel.rig->cameras[i].vehicle_from_camera->translation(),
               serial.rig->cameras[i].vehicle_from_camera->translation());
   }
-}
-
-TEST(OdometryNoiseTest, MatchesTheDrive) {
-  const ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
-  RigAdjustmentOptions loose;
-  const OdometryNoise noise = estimateOdometryNoise(loose, data);
-  EXPECT_NEAR(noise.sigmas[0], 0.002, 0.0006);
-  EXPECT_NEAR(noise.sigmas[1], 0.002, 0.0006);
-  EXPECT_NEAR(noise.sigmas[5], 0.0005, 0.00015);
-}
-
-TEST(OdometryNoiseTest, TellsForwardsFromSideways) {
-  ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
-  RigidTransform without_noise = data.keyframes.front().map_from_vehicle;
-  for (size_t i = 1; i < data.keyframes.size(); ++i) {
-    const RigidTransform step =
-        data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
-    const double forwards_m = step.translation().x() + (i % 2 == 0 ? 0.004 : -0.004);
-    const RigidTransform counted =
-        RigidTransform::planar(forwards_m, step.translation().y(), yawOfRotation(step.rotation()));
-    without_noise = without_noise * counted;
-    data.keyframes[i].odom_from_vehicle = without_noise;
-  }
-  data.keyframes.front().odom_from_vehicle = data.keyframes.front().map_from_vehicle;
-  const OdometryNoise noise = estimateOdometryNoise(RigAdjustmentOptions(), data);
-  EXPECT_GT(noise.sigmas[0], 0.004);
-  EXPECT_LT(noise.sigmas[1], 0.001);
-}
-
-TEST(OdometryNoiseTest, DetectsSlippingWheels) {
-  ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
-  for (size_t i = 60; i < data.keyframes.size(); ++i) {
-    RigidTransform& pose = data.keyframes[i].odom_from_vehicle;
-    pose = data.keyframes[59].odom_from_vehicle * RigidTransform::planar(0.1, 0.0, 0.0) *
-           data.keyframes[59].odom_from_vehicle.inverse() * pose;
-  }
-  const OdometryNoise noise = estimateOdometryNoise(RigAdjustmentOptions(), data);
-  EXPECT_TRUE(noise.has_slipped[60]);
-  EXPECT_EQ(std::count(noise.has_slipped.begin(), noise.has_slipped.end(), true), 1);
-  EXPECT_NEAR(noise.sigmas[0], 0.002, 0.0006);
 }
 
 TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {

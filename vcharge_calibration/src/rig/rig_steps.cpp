@@ -51,7 +51,7 @@ class RigSteps {
       stages_.run("loops", [&] { closeAllLoops(); });
       stages_.run("landmark search", [&] { searchAndAdjust(); });
       correctTimeOffset(series_, state_, &result_);
-      priors_.odometry = estimateOdometryNoise(options_.adjustment, *data_);
+      priors_.odometry = estimateOdometryNoise(options_.adjustment.bundle, *data_);
       stages_.run("between cameras", [&] {
         result_.num_inter_camera_matches += matchBetweenCameras(options_.inter_camera, all_images_, data_,
                                                                 static_cast<size_t>(first_of_new_));

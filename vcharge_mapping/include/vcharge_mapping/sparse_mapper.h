@@ -47,6 +47,7 @@ class SparseMapper : public DriveConsumer {
   ReconstructionState state_;
   KeyframeImages images_ = KeyframeImages::ofAllKeyframes();
   std::unique_ptr<FrameFollower> follower_;
+  OdometryNoise odometry_noise_;  ///< known in the last adjustment
 };
 
 /// The map of a drive that goes on: landmarks are triangulated from the poses of tracking, nothing is

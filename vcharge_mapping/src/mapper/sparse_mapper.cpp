@@ -72,6 +72,7 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const StageCallback& progr
   });
   stages.run("landmark search", [&] { searchLandmarks(options_.search, data); });
   stages.run("adjustment", [&] { adjust(options_.bundle); });
+  odometry_noise_ = estimateOdometryNoise(options_.bundle, *data);
   stages.run("second landmark search", [&] { searchLandmarks(options_.search, data); });
   stages.run("landmark patches", [&] { alignLandmarks(options_.landmark_alignment, images_, data); });
   stages.run("last adjustment", [&] {
@@ -102,7 +103,7 @@ void SparseMapper::adjustFirst() {
 }
 
 void SparseMapper::adjust(const BundleAdjustmentOptions& options) {
-  recordAdjustment(adjustBundle(options, &state_.data), &state_.report);
+  recordAdjustment(adjustBundle(options, &state_.data, odometry_noise_), &state_.report);
 }
 
 std::shared_ptr<const SparseMap> makeMapSoFar(ReconstructionState state, const SparseMapperOptions& options) {

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "vcharge_core/base/options.h"
+#include "vcharge_reconstruction/adjustment/odometry_noise.h"
 #include "vcharge_reconstruction/bundle_solver.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
 
@@ -44,13 +45,17 @@ struct BundleAdjustmentSummary {
 
 /// Adjusts the keyframes (six degrees of freedom; the first is fixed), the landmarks and the odometer's
 /// factors so that the robust sum of reprojection and odometry errors is least, with fixed extrinsics. Calls
-/// removeOutliers() at the end.
-BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data);
+/// removeOutliers() at the end. The options' deviations of the odometry count where its noise is not known.
+BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data,
+                                     const OdometryNoise& odometry = {});
 
 // The steps of adjustBundle(), for adjustments with further terms.
 
 /// The problem with the observations of the landmarks and the odometer factors between keyframes.
-BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data);
+BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data,
+                                const OdometryNoise& odometry = {});
+/// The noise as estimated from adjusted keyframes, and at most what the options assume.
+OdometryNoise estimateOdometryNoise(const BundleAdjustmentOptions& options, const ReconstructionData& data);
 /// Copies poses, points and the odometer's factors of a problem of makeBundleProblem() back to the data.
 void writeBack(const BundleProblem& problem, ReconstructionData* data);
 /// Projected minus observed position of a landmark. False if the camera does not project it.

@@ -14,15 +14,18 @@
 namespace vcharge {
 namespace {
 
-Eigen::Matrix<double, 6, 6> odometryInformation(const RigidTransform& motion,
-                                                const BundleAdjustmentOptions& options) {
+OdometrySigmas odometrySigmas(const RigidTransform& motion, const BundleAdjustmentOptions& options) {
   const double distance_m = motion.translation().head<2>().norm();
   const double sigma_m = options.odometry_sigma_m + options.odometry_distance_sigma * distance_m;
   const double sigma_rad =
       options.odometry_sigma_rad + options.odometry_turn_sigma * std::abs(yawOfRotation(motion.rotation()));
-  Eigen::Matrix<double, 6, 1> sigmas;
+  OdometrySigmas sigmas;
   sigmas << sigma_m, sigma_m, options.height_sigma_m, options.tilt_sigma_rad, options.tilt_sigma_rad,
       sigma_rad;
+  return sigmas;
+}
+
+Eigen::Matrix<double, 6, 6> informationOf(const OdometrySigmas& sigmas) {
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
@@ -30,9 +33,9 @@ Eigen::Matrix<double, 6, 6> odometryInformation(const RigidTransform& motion,
 Eigen::Matrix<double, 6, 6> sessionBorderInformation() {
   constexpr double kSigma_m = 10.0;
   constexpr double kSigma_rad = 1.0;
-  Eigen::Matrix<double, 6, 1> sigmas;
+  OdometrySigmas sigmas;
   sigmas << kSigma_m, kSigma_m, kSigma_m, kSigma_rad, kSigma_rad, kSigma_rad;
-  return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+  return informationOf(sigmas);
 }
 
 /// An observation this close to its landmark shows it, even where it errs more than its deviation says.
@@ -129,7 +132,8 @@ bool reprojectionError(const ReconstructionData& data, const Track& track,
   return true;
 }
 
-BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data) {
+BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data,
+                                const OdometryNoise& odometry) {
   BundleProblem problem;
   problem.rig = data.rig;
   problem.odometer = {data.odometry_distance_scale, data.odometry_turn_scale};
@@ -161,8 +165,10 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Re
       continue;
     }
     const RigidTransform motion = previous.odom_from_vehicle.inverse() * keyframe.odom_from_vehicle;
+    const bool is_known = !odometry.empty() && odometry[i].has_value();
     problem.odometer_factors.push_back(
-        {static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
+        {static_cast<int32_t>(i), motion,
+         informationOf(is_known ? *odometry[i] : odometrySigmas(motion, options))});
   }
   return problem;
 }
@@ -181,10 +187,15 @@ void writeBack(const BundleProblem& problem, ReconstructionData* data) {
   data->odometry_turn_scale = problem.odometer[1];
 }
 
-BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data) {
+OdometryNoise estimateOdometryNoise(const BundleAdjustmentOptions& options, const ReconstructionData& data) {
+  return estimateOdometryNoise(data, odometrySigmas(RigidTransform(), options));
+}
+
+BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data,
+                                     const OdometryNoise& odometry) {
   options.validate();
   check(!data->keyframes.empty(), "adjustBundle: expected keyframes");
-  BundleProblem problem = makeBundleProblem(options, *data);
+  BundleProblem problem = makeBundleProblem(options, *data, odometry);
   const BundleSolution solved = solveBundle(options.max_iterations, options.cost_tolerance, &problem);
   writeBack(problem, data);
   BundleAdjustmentSummary summary = removeOutliers(options, data);

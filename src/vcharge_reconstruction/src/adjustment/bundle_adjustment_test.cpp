@@ -79,6 +79,36 @@ TEST(BundleAdjustmentTest, RemovesWrongObservationsOnly) {
   EXPECT_LE(summary.num_removed_observations, num_wrong + summary.num_observations / 200);
 }
 
+// In the dark, observations err more than their deviations say. An odometer that was good where the images
+// were good is good there, too.
+TEST(BundleAdjustmentTest, FollowsAGoodOdometerWhereImagesAreBad) {
+  testing::TestDriveOptions drive;
+  drive.noise_px = 0.3;
+  const ReconstructionData truth = testing::makeTestDrive(drive);
+  ReconstructionData data = truth;
+  const auto num_keyframes = static_cast<int32_t>(data.keyframes.size());
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise_px(0.0, 5.0);
+  for (Track& track : data.tracks) {
+    for (TrackObservation& observation : track.observations) {
+      if (observation.keyframe > num_keyframes / 3 && observation.keyframe < num_keyframes / 2) {
+        observation.position_px += Eigen::Vector2d(noise_px(random), noise_px(random));
+      }
+    }
+  }
+  const BundleAdjustmentOptions options;
+  ReconstructionData with_estimate = data;
+  adjustBundle(options, &with_estimate);
+  const OdometryNoise noise = estimateOdometryNoise(options, with_estimate);
+  ASSERT_TRUE(noise.back().has_value());
+  EXPECT_LT((*noise.back())[0], 0.5 * options.odometry_sigma_m);
+  adjustBundle(options, &with_estimate, noise);
+  ReconstructionData without = data;
+  adjustBundle(options, &without);
+  adjustBundle(options, &without);
+  EXPECT_LT(worstPositionError(with_estimate, truth), 0.7 * worstPositionError(without, truth));
+}
+
 TEST(BundleAdjustmentTest, GivesTheSameTwice) {
   ReconstructionData first = testing::makeTestDrive(testing::TestDriveOptions());
   disturb(&first);
