@@ -2,7 +2,6 @@
 // and above it, a drive of circles to both sides.
 #include "rig/rig_adjustment.h"
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 

@@ -41,13 +41,12 @@ class SparseMapper : public DriveConsumer {
  private:
   void requireKeyframes() const;
   void adjustFirst();
-  void adjust(const BundleAdjustmentOptions& options);
+  void adjust(const BundleAdjustmentOptions& options, const OdometryNoise& odometry = {});
 
   const SparseMapperOptions options_;
   ReconstructionState state_;
   KeyframeImages images_ = KeyframeImages::ofAllKeyframes();
   std::unique_ptr<FrameFollower> follower_;
-  OdometryNoise odometry_noise_;  ///< known in the last adjustment
 };
 
 /// The map of a drive that goes on: landmarks are triangulated from the poses of tracking, nothing is

@@ -72,11 +72,10 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const StageCallback& progr
   });
   stages.run("landmark search", [&] { searchLandmarks(options_.search, data); });
   stages.run("adjustment", [&] { adjust(options_.bundle); });
-  odometry_noise_ = estimateOdometryNoise(options_.bundle, *data);
   stages.run("second landmark search", [&] { searchLandmarks(options_.search, data); });
   stages.run("landmark patches", [&] { alignLandmarks(options_.landmark_alignment, images_, data); });
   stages.run("last adjustment", [&] {
-    adjust(options_.bundle);
+    adjust(options_.bundle, estimateOdometryNoise(options_.bundle, *data));
     checkLoops(*data, &state_.report.loop_edges);
   });
   stages.run("assembly", [&] { map = assembleWithLandmarks(options_, &state_); });
@@ -102,8 +101,8 @@ void SparseMapper::adjustFirst() {
   adjust(options_.bundle);
 }
 
-void SparseMapper::adjust(const BundleAdjustmentOptions& options) {
-  recordAdjustment(adjustBundle(options, &state_.data, odometry_noise_), &state_.report);
+void SparseMapper::adjust(const BundleAdjustmentOptions& options, const OdometryNoise& odometry) {
+  recordAdjustment(adjustBundle(options, &state_.data, odometry), &state_.report);
 }
 
 std::shared_ptr<const SparseMap> makeMapSoFar(ReconstructionState state, const SparseMapperOptions& options) {

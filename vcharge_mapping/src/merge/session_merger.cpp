@@ -72,11 +72,10 @@ class SessionMerger {
     }
     stages_.run("adjustment", [&] { adjust(); });
     stages_.run("last adjustment", [&] {
-      // A session whose poses were adjusted before keeps its shape where it shows little, as in the dark.
-      odometry_noise_ = estimateOdometryNoise(options_.bundle, state_.data);
       // Within map and session, too: their poses are better now.
       searchLandmarks(options_.search, &state_.data);
-      adjust();
+      // A session whose poses were adjusted before keeps its shape where it shows little, as in the dark.
+      adjust(estimateOdometryNoise(options_.bundle, state_.data));
       checkLoops(state_.data, &state_.report.loop_edges);
     });
     std::sort(state_.report.loop_edges.begin(), state_.report.loop_edges.end(),
@@ -145,8 +144,8 @@ class SessionMerger {
     }
   }
 
-  void adjust() {
-    const BundleAdjustmentSummary summary = adjustBundle(options_.bundle, &state_.data, odometry_noise_);
+  void adjust(const OdometryNoise& odometry = {}) {
+    const BundleAdjustmentSummary summary = adjustBundle(options_.bundle, &state_.data, odometry);
     recordAdjustment(summary, &state_.report);
     report_.rms_px = summary.rms_px;
   }
@@ -209,7 +208,6 @@ class SessionMerger {
   const SparseMap apart_;
   const int32_t first_of_new_;
   std::vector<LoopEdge> between_;
-  OdometryNoise odometry_noise_;  ///< known in the last adjustment
   MergeReport report_;
 };
 

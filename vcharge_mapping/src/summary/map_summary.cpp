@@ -16,6 +16,7 @@
 
 #include "update/reduced_map.h"
 #include "update/same_place.h"
+#include "vcharge_core/base/quantile.h"
 #include "vcharge_core/motion/cross_matrix.h"
 
 namespace vcharge {
@@ -161,21 +162,15 @@ class LandmarkChooser {
       factors.push_back(positionSigma_m(covariance_[k]) / sigma_of_all_m_[k]);
     }
     report.worst_sigma_factor = *std::max_element(factors.begin(), factors.end());
-    report.median_sigma_factor = medianOf(factors);
+    report.median_sigma_factor = quantile(factors, 0.5);
     report.mean_sigma_factor = geometricMeanOf(factors);
     report.least_sigma_factor = report.mean_sigma_factor * std::exp(-possibleGain(report.num_landmarks));
-    report.median_num_found_before = kFoundInFrame * medianOf(found_of_all_);
-    report.median_num_found = kFoundInFrame * medianOf(found_);
+    report.median_num_found_before = kFoundInFrame * quantile(found_of_all_, 0.5);
+    report.median_num_found = kFoundInFrame * quantile(found_, 0.5);
     return report;
   }
 
  private:
-  static double medianOf(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
-
   static double geometricMeanOf(const std::vector<double>& values) {
     double sum = 0.0;
     for (const double value : values) {

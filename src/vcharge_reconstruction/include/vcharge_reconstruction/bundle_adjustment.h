@@ -53,8 +53,8 @@ BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, Rec
 
 /// The problem with the observations of the landmarks and the odometer factors between keyframes.
 BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data,
-                                const OdometryNoise& odometry = {});
-/// The noise as estimated from adjusted keyframes, and at most what the options assume.
+                                const OdometryNoise& odometry);
+/// The noise as estimated from adjusted keyframes, and at most what the options assume of a short motion.
 OdometryNoise estimateOdometryNoise(const BundleAdjustmentOptions& options, const ReconstructionData& data);
 /// Copies poses, points and the odometer's factors of a problem of makeBundleProblem() back to the data.
 void writeBack(const BundleProblem& problem, ReconstructionData* data);

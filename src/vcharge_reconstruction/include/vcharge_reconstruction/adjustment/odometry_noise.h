@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -20,8 +19,8 @@ using OdometrySigmas = Eigen::Matrix<double, 6, 1>;
 using OdometryNoise = std::vector<std::optional<OdometrySigmas>>;
 
 /// Estimates the noise in each session from its adjusted keyframes: an upper bound, since it contains their
-/// own errors. A motion that has slipped stands out among those around it, and gets little weight. `most`:
-/// what is assumed without an estimate, and never exceeded otherwise. Not known in short sessions.
+/// own errors. A motion that has slipped stands out among those around it, and gets a large deviation. No
+/// other motion gets more than `most`, which is assumed without an estimate. Not known in short sessions.
 OdometryNoise estimateOdometryNoise(const ReconstructionData& data, const OdometrySigmas& most);
 
 }  // namespace vcharge
