@@ -19,21 +19,17 @@ struct PoseFilterOptions {
   VCHARGE_OPTION(double, distance_sigma, 0.01, notNegative(), "Position noise after a metre, in metres.");
   VCHARGE_OPTION(double, yaw_sigma_rad, 0.0012, notNegative(), "Heading noise after a metre.");
   VCHARGE_OPTION(double, fix_covariance_factor, 3.0, positive(), "Factor on the covariance of a fix.");
-  VCHARGE_OPTION(double, map_sigma_m, 0.003, notNegative(), "Position error of a map of reference pixels.");
-  VCHARGE_OPTION(double, map_sigma_rad, 0.0004, notNegative(), "Rotation error of such a map.");
   VCHARGE_OPTION(double, gate, 30.0, positive(), "Largest squared Mahalanobis distance of a fix.");
   VCHARGE_END_OPTIONS();
 };
-
-/// Scales the options' map errors for a map made from this rig's images: proportional to the pixels' angle.
-PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options);
 
 /// Fuses fixes with odometry: an error-state Kalman filter over the vehicle's pose in the map and the
 /// odometer's factors. Intervals without fixes therefore use factors that were estimated from earlier
 /// fixes.
 ///
 /// Successive fixes have the error of the map in common, which averaging does not reduce. It is added to the
-/// covariance that pose() returns; the more drives saw the landmarks, the smaller it is.
+/// covariance that pose() returns. A drive that made the map saw the place about as well as the last fix, so
+/// that the map's error has the covariance of that fix, divided by the number of these drives.
 ///
 /// How accurate fixes are depends on the place, the light and the map. pose() therefore scales the covariance
 /// at the last fix by how far the last fixes were from their predictions, relative to what the covariances
@@ -53,6 +49,7 @@ class PoseFilter {
 
   /// Replaces the pose and keeps the odometer's factors.
   void reset(const PosePrior& pose);
+  void reset(const PoseFix& fix);
   void forget() { has_pose_ = false; }
 
   /// Predicts the pose after a motion measured by the odometer.
@@ -75,7 +72,6 @@ class PoseFilter {
                         Matrix8d* covariance);
   Matrix6d noiseOf(const PoseFix& fix) const;
   Eigen::Matrix<double, 6, 1> differenceTo(const RigidTransform& map_from_vehicle) const;
-  Matrix6d mapCovariance(double variance_ratio) const;
 
   PoseFilterOptions options_;
   bool has_pose_ = false;
@@ -83,7 +79,7 @@ class PoseFilter {
   Eigen::Vector2d factors_ = Eigen::Vector2d::Ones();  ///< ratios of true to measured distance and turn
   Matrix8d covariance_ = Matrix8d::Zero();             ///< [dt, dphi] in the map's frame, factors
   Matrix8d scaled_ = Matrix8d::Zero();                 ///< the same, scaled at the last fix
-  double map_variance_ratio_ = 1.0;                    ///< of the last fix
+  Matrix6d map_covariance_ = Matrix6d::Zero();         ///< at the last fix
   double consistency_ = 1.0;                           ///< mean distance of fixes over the expected one
 };
 

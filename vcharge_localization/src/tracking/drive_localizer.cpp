@@ -28,7 +28,7 @@ DriveLocalizer::DriveLocalizer(std::shared_ptr<const TiledMap> map, std::shared_
     : rig_(std::move(rig)),
       options_((options.validate(), options)),
       localizer_(std::move(map), rig_, options.localizer),
-      filter_(optionsForMapOf(localizer_.map()->rig(), options.filter)),
+      filter_(options.filter),
       health_(rig_, options.health),
       hypotheses_(std::make_unique<PlaceHypotheses>(localizer_, options.localizer.max_ambiguity)) {}
 
@@ -146,7 +146,7 @@ void DriveLocalizer::searchWholeMap(const ImageFrame& frame, const RigFeatures& 
   } else if (tracks && filter_.update(found.fix)) {
     takeFix(found.fix, result);
   } else if (found.is_confirmed) {
-    filter_.reset({found.fix.map_from_vehicle, options_.filter.fix_covariance_factor * found.fix.covariance});
+    filter_.reset(found.fix);
     takeFix(found.fix, result);
     result->message = "found in the map";
   } else {

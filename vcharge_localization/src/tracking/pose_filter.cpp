@@ -7,7 +7,6 @@
 #include <Eigen/Geometry>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/camera/pixel_angle.h"
 #include "vcharge_core/motion/cross_matrix.h"
 #include "vcharge_core/motion/pose_step.h"
 
@@ -23,10 +22,6 @@ constexpr double kTiltSigma_rad = 0.003;
 constexpr double kTimeSigma_m = 0.002;
 constexpr double kTimeSigma_rad = 0.0005;
 
-constexpr double kReferencePixel_rad =
-    0.005;                            // map_sigma_m and map_sigma_rad were measured with these pixels
-constexpr double kFinestPixel = 0.5;  // relative to the reference; finer images were not measured
-
 /// Weight of a fix in the mean over the last ones: about as many as in four seconds.
 constexpr double kConsistencyGain = 0.02;
 // A mean beyond these says more about the filter's model than about the place.
@@ -37,20 +32,11 @@ double squared(double value) {
   return value * value;
 }
 
-}  // namespace
-
-PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options) {
-  double sum_rad = 0.0;
-  for (const RigCamera& camera : rig.cameras) {
-    sum_rad += radiansPerPixel(camera);
-  }
-  const double pixel_rad = sum_rad / static_cast<double>(std::max<size_t>(1, rig.cameras.size()));
-  const double factor = std::max(kFinestPixel, pixel_rad / kReferencePixel_rad);
-  PoseFilterOptions scaled = options;
-  scaled.map_sigma_m *= factor;
-  scaled.map_sigma_rad *= factor;
-  return scaled;
+Eigen::Matrix<double, 6, 6> mapCovarianceAt(const PoseFix& fix) {
+  return fix.map_variance_ratio * fix.covariance;
 }
+
+}  // namespace
 
 PoseFilter::PoseFilter(const PoseFilterOptions& options) : options_(options) {
   options_.validate();
@@ -58,22 +44,14 @@ PoseFilter::PoseFilter(const PoseFilterOptions& options) : options_(options) {
   covariance_(7, 7) = squared(options_.turn_sigma);
 }
 
-PoseFilter::Matrix6d PoseFilter::mapCovariance(double variance_ratio) const {
-  Eigen::Matrix<double, 6, 1> sigmas;
-  sigmas << Eigen::Vector3d::Constant(options_.map_sigma_m),
-      Eigen::Vector3d::Constant(options_.map_sigma_rad);
-  return (variance_ratio * sigmas.cwiseAbs2()).asDiagonal();
-}
-
 PosePrior PoseFilter::pose() const {
   check(has_pose_, "PoseFilter::pose: nothing is known yet");
-  return {map_from_vehicle_,
-          scaled_.topLeftCorner<6, 6>() + consistency_ * mapCovariance(map_variance_ratio_)};
+  return {map_from_vehicle_, scaled_.topLeftCorner<6, 6>() + consistency_ * map_covariance_};
 }
 
 PosePrior PoseFilter::prediction() const {
   check(has_pose_, "PoseFilter::prediction: nothing is known yet");
-  return {map_from_vehicle_, covariance_.topLeftCorner<6, 6>() + mapCovariance(map_variance_ratio_)};
+  return {map_from_vehicle_, covariance_.topLeftCorner<6, 6>() + map_covariance_};
 }
 
 void PoseFilter::reset(const PosePrior& pose) {
@@ -84,7 +62,12 @@ void PoseFilter::reset(const PosePrior& pose) {
   covariance_.topLeftCorner<6, 6>() = pose.covariance;
   scaled_ = covariance_;
   consistency_ = 1.0;
-  map_variance_ratio_ = 1.0;
+  map_covariance_.setZero();
+}
+
+void PoseFilter::reset(const PoseFix& fix) {
+  reset(PosePrior{fix.map_from_vehicle, options_.fix_covariance_factor * fix.covariance});
+  map_covariance_ = mapCovarianceAt(fix);
 }
 
 void PoseFilter::propagate(const Matrix8d& by_state, const Matrix6d& noise, double factor_noise,
@@ -145,7 +128,7 @@ Eigen::Matrix<double, 6, 1> PoseFilter::differenceTo(const RigidTransform& map_f
 }
 
 PoseFilter::Matrix6d PoseFilter::noiseOf(const PoseFix& fix) const {
-  return options_.fix_covariance_factor * fix.covariance + mapCovariance(fix.map_variance_ratio);
+  return options_.fix_covariance_factor * fix.covariance + mapCovarianceAt(fix);
 }
 
 double PoseFilter::distanceOf(const PoseFix& fix) const {
@@ -168,7 +151,7 @@ bool PoseFilter::update(const PoseFix& fix) {
   consistency_ =
       std::clamp((1.0 - kConsistencyGain) * consistency_ + kConsistencyGain * distance / kExpectedDistance,
                  kMinConsistency, kMaxConsistency);
-  map_variance_ratio_ = fix.map_variance_ratio;
+  map_covariance_ = mapCovarianceAt(fix);
   const Matrix6d noise = noiseOf(fix);
   const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noise;
   const Eigen::Matrix<double, 8, 6> gain = expected.ldlt().solve(covariance_.topRows<6>()).transpose();

@@ -103,9 +103,10 @@ RigidTransform noiseOfOdometer(const PoseFilterOptions& options, double way_m, s
   return RigidTransform::planar(x_m, y_m, options.yaw_sigma_rad * noise(*random));
 }
 
-/// Mean normalized error squared per degree of freedom, where fixes and maps have `factor` times the errors
-/// that they are expected to have.
+/// Mean normalized error squared per degree of freedom, where fixes and a map of one drive have `factor`
+/// times the errors that they are expected to have.
 double consistencyOf(double factor) {
+  constexpr double kSigma_m = 0.004, kSigma_rad = 0.0003;
   PoseFilterOptions options;
   options.fix_covariance_factor = 1.0;
   double sum = 0.0;
@@ -115,7 +116,7 @@ double consistencyOf(double factor) {
     Drive drive;
     PoseFilter filter(options);
     filter.reset(priorAt(fixAt(drive.map_from_vehicle, 0.02, 0.001, &random)));
-    MapError map_error(factor * options.map_sigma_m, factor * options.map_sigma_rad, seed);
+    MapError map_error(factor * kSigma_m, factor * kSigma_rad, seed);
     for (int i = 0; i < 500; ++i) {
       const RigidTransform moved = drive.step();
       const double way_m = moved.translation().norm();
@@ -123,7 +124,7 @@ double consistencyOf(double factor) {
       const RigidTransform shifted = map_error.after(way_m);
       const RigidTransform seen(shifted.rotation() * drive.map_from_vehicle.rotation(),
                                 drive.map_from_vehicle.translation() + shifted.translation());
-      PoseFix fix = fixAt(seen, factor * 0.004, factor * 0.0003, &random);
+      PoseFix fix = fixAt(seen, factor * kSigma_m, factor * kSigma_rad, &random);
       fix.covariance /= factor * factor;
       filter.update(fix);
       if (i > 100 && i % 50 == 24) {
@@ -202,47 +203,29 @@ TEST(PoseFilterTest, CovarianceStaysSymmetricAndPositive) {
   EXPECT_EQ(covariance.llt().info(), Eigen::Success);
 }
 
-TEST(PoseFilterTest, ErrorsOfMapsAreProportionalToTheAngleOfPixels) {
-  const PoseFilterOptions options;
-  struct Case {
-    std::array<double, 2> pixels_rad;  // pixel widths of two cameras; their angles are slightly smaller
-    double factor;                     // expected factor on the map's errors
-  };
-  for (const auto& [pixels_rad, factor] :
-       {Case{{0.001, 0.001}, 0.5}, Case{{0.003, 0.005}, 0.8}, Case{{0.005, 0.005}, 1.0},
-        Case{{0.01, 0.01}, 2.0}, Case{{0.01, 0.02}, 3.0}}) {
-    CameraRig rig;
-    for (const double pixel_rad : pixels_rad) {
-      const double focal_px = 1.0 / pixel_rad;
-      PinholeCamera::Parameters parameters;
-      parameters << focal_px, focal_px, 320.0, 200.0, Eigen::Vector4d::Zero();
-      rig.cameras.push_back(
-          {"camera", "camera_optical", {640, 400}, PinholeCamera(parameters), M_PI, "", {}, {}, {}});
+TEST(PoseFilterTest, AMapHasTheErrorOfAFixOverTheNumberOfDrives) {
+  constexpr double kSigma_m = 0.01;
+  PoseFix fix;
+  fix.covariance = kSigma_m * kSigma_m * Eigen::Matrix<double, 6, 6>::Identity();
+  for (const double num_drives : {1.0, 2.0, 4.0}) {
+    fix.map_variance_ratio = 1.0 / num_drives;
+    PoseFilter filter;
+    filter.reset(fix);
+    for (int i = 0; i < 100000; ++i) {
+      ASSERT_TRUE(filter.update(fix));
     }
-    const PoseFilterOptions scaled = optionsForMapOf(rig, options);
-    EXPECT_NEAR(scaled.map_sigma_m, factor * options.map_sigma_m, 1e-3 * options.map_sigma_m);
-    EXPECT_NEAR(scaled.map_sigma_rad, factor * options.map_sigma_rad, 1e-3 * options.map_sigma_rad);
-    PoseFilter filter(scaled);
-    filter.reset({});
-    EXPECT_NEAR(filter.pose().covariance(0, 0), scaled.map_sigma_m * scaled.map_sigma_m, 1e-12);
+    EXPECT_NEAR(filter.prediction().covariance(0, 0), kSigma_m * kSigma_m / num_drives,
+                1e-3 * kSigma_m * kSigma_m);
   }
 }
 
-TEST(PoseFilterTest, AMapOfSeveralDrivesHasASmallerError) {
-  PoseFix fix;
-  fix.covariance = 1e-12 * Eigen::Matrix<double, 6, 6>::Identity();
-  double variance_of_one_m2 = 0.0;
-  for (const double num_drives : {1.0, 2.0, 4.0}) {
-    PoseFilter filter;
-    filter.reset({});
-    for (int i = 0; i < 50; ++i) {
-      fix.map_variance_ratio = 1.0 / num_drives;
-      ASSERT_TRUE(filter.update(fix));
-    }
-    const double variance_m2 = filter.prediction().covariance(0, 0);
-    variance_of_one_m2 = num_drives == 1.0 ? variance_m2 : variance_of_one_m2;
-    EXPECT_NEAR(variance_m2, variance_of_one_m2 / num_drives, 0.01 * variance_of_one_m2);
-  }
+TEST(PoseFilterTest, APriorHasNoErrorOfTheMapBeforeTheFirstFix) {
+  PosePrior prior;
+  prior.covariance = Eigen::Matrix<double, 6, 6>::Identity();
+  PoseFilter filter;
+  filter.reset(PoseFix());
+  filter.reset(prior);
+  EXPECT_EQ(filter.pose().covariance, prior.covariance);
 }
 
 }  // namespace
