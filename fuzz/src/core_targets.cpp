@@ -7,6 +7,7 @@
 #include "fuzz_target.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/height_map_file.h"
+#include "vcharge_core/dense_maps/parking_bay_file.h"
 #include "vcharge_core/dense_maps/range_map_file.h"
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/motion/trajectory.h"
@@ -19,6 +20,10 @@ namespace {
 
 constexpr char kTrajectory[] =
     "# time x y z q\n1.0 0 0 0 0 0 0 1\n1.080000001 0.1 -1e-3 0 0 0 0.1 0.99498743710662\n";
+
+constexpr char kBays[] =
+    "frame: map\nbays:\n  - {id: 1, row: 0, kind: angled, state: free, corners_m: [[0, 0], [1, 0], [1, 1], "
+    "[0, 1]], entry_sigma_m: 0.05, end_sigma_m: 0.4, confidence: 1}\n";
 
 std::string rigText() {
   CameraRig rig = makeAnalyticMap({2, 4}).rig;
@@ -86,6 +91,8 @@ std::vector<FuzzTarget> coreTargets() {
       fileTarget("sparse_map", "a.vmap", {sparseMapBytes()},
                  [](const std::string& path) { readSparseMap(path)->contentHash(); }),
       fileTarget("map_tiles", "a.vmap", {sparseMapBytes()}, readTiles),
+      fileTarget("parking_bays", "bays.yaml", {kBays},
+                 [](const std::string& path) { readParkingBays(path); }),
       heightMapTarget("height_map_yaml", "height_map.yaml"),
       heightMapTarget("height_map_tiff", "height_map.tiff"),
   };
