@@ -13,6 +13,7 @@
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/progress_bar.h"
+#include "vcharge_core/dense_maps/parking_bay_file.h"
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_recordings/drive_bag_writer.h"
 #include "vcharge_simulation/drive/truth_maps.h"
@@ -216,6 +217,9 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, kHeightLimit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
+    if (!renderer->scene().bays.empty()) {
+      writeParkingBays({"world", renderer->scene().bays}, truth.path() + "/bays.yaml");
+    }
     if (!renderer->scene().movers.empty()) {
       writeMovers(renderer->scene().movers, stamps, scene_times_s, truth.path() + "/movers.yaml");
     }

@@ -15,7 +15,8 @@ int main(int argc, char** argv) {
   vcharge::CommandLine app(
       "Simulates a drive of a car with four fisheye cameras and writes it as a bag. Beside it are written "
       "rig_truth.yaml and the folder BAG_truth with rig.yaml and masks, trajectory.tum, height_map.tiff and "
-      ".yaml, obstacles.yaml, movers.yaml, faults.yaml and, depending on options and scene, board.yaml, "
+      ".yaml, obstacles.yaml, bays.yaml, movers.yaml, faults.yaml and, depending on options and scene, "
+      "board.yaml, "
       "range/CAMERA/STAMP_NS.tiff, and rig_before.yaml and rig_after.yaml of a fault that changes the rig.");
   const vcharge::ScenarioCommandLine command_line(&app);
   vcharge::RecordingOptions recording;

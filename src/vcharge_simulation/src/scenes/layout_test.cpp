@@ -143,6 +143,42 @@ TEST_P(LayoutTest, ADrawnSceneHoldsWhatItsLayoutNames) {
   }
 }
 
+TEST_P(LayoutTest, PaintedBaysTouchTheirNeighboursAndHoldTheParkedCars) {
+  for (uint64_t layout_seed = 1; layout_seed <= kLayouts; ++layout_seed) {
+    std::vector<PlannedBay> planned;
+    std::vector<ParkedCar> cars;
+    if (GetParam() == "lot") {
+      const LotLayout layout = makeLotLayout(3, {}, layout_seed);
+      planned = layout.bays;
+      cars = layout.cars;
+    } else {
+      const GarageLayout layout = makeGarageLayout(3, {}, layout_seed);
+      planned = layout.bays;
+      cars = layout.cars;
+    }
+    const std::vector<ParkingBay> bays = paintedBays(planned, cars);
+    ASSERT_EQ(bays.size(), planned.size());
+    size_t num_occupied = 0;
+    for (size_t i = 0; i < bays.size(); ++i) {
+      num_occupied += bays[i].state == BayState::kOccupied ? 1 : 0;
+      const auto& c = bays[i].corners_m;
+      for (size_t k = 0; k < c.size(); ++k) {
+        const Eigen::Vector2d side = c[(k + 1) % 4] - c[k], next = c[(k + 2) % 4] - c[(k + 1) % 4];
+        EXPECT_GT(side.x() * next.y() - side.y() * next.x(), 0.0) << "counter-clockwise";
+      }
+      if (i > 0 && bays[i].row == bays[i - 1].row &&
+          (bays[i].centre_m() - bays[i - 1].centre_m()).norm() < 3.5) {
+        // Lines between bays are painted once.
+        const auto& p = bays[i - 1].corners_m;
+        EXPECT_LT(std::min((c[0] - p[1]).norm() + (c[3] - p[2]).norm(),
+                           (c[1] - p[0]).norm() + (c[2] - p[3]).norm()),
+                  1e-6);
+      }
+    }
+    EXPECT_EQ(num_occupied, cars.size()) << "layout " << layout_seed;
+  }
+}
+
 TEST(GarageFittingsTest, HaveNormalsUnderLowCeilingsToo) {
   int num_low = 0;
   for (uint64_t layout_seed = 1; layout_seed <= 3 * kLayouts; ++layout_seed) {

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "vcharge_core/dense_maps/parking_bay.h"
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_core/motion/tracked_object.h"
 #include "vcharge_simulation/rendering/mesh.h"
@@ -115,6 +116,7 @@ struct Scene {
   std::vector<Lamp> lamps;           ///< lamps whose light on objects is computed when rendering
   VehicleLamps vehicle_lamps;
   std::vector<Obstacle> obstacles;  ///< static obstacles
+  std::vector<ParkingBay> bays;     ///< painted ones, with the parked cars
   std::vector<Mover> movers;
   GroundHeight ground_height;  ///< height of the drivable ground
   /// Height above the ground from which objects are overhead: truth maps ignore them.

@@ -39,13 +39,13 @@ cv::Mat drawStop(Random* random) {
   return image;
 }
 
-void addWheelStops(const std::vector<ParkingBay>& bays, SceneParts* parts) {
+void addWheelStops(const std::vector<PlannedBay>& bays, SceneParts* parts) {
   constexpr int kVariants = 6;
   std::vector<uint32_t> materials;
   for (int i = 0; i < kVariants; ++i) {
     materials.push_back(parts->textured(SurfaceKind::kOther, drawStop(&parts->random()), 110.0));
   }
-  for (const ParkingBay& bay : bays) {
+  for (const PlannedBay& bay : bays) {
     const double end = bay.yaw_rad > 0.0 ? 1.0 : -1.0;
     const double y = bay.y + end * (0.5 * kGarageBayLength_m - kStopToEnd_m);
     const double yaw_rad = parts->random().uniform(-0.03, 0.03);

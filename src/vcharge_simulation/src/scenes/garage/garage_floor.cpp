@@ -20,7 +20,7 @@ constexpr double kJoint_m = 7.8;
 cv::Mat drawMarkings(const GarageLayout& layout, double texel_m) {
   const Lanes& lanes = layout.plan.lanes;
   MarkingPainter painter(layout.plan.area, texel_m);
-  for (const ParkingBay& bay : layout.bays) {
+  for (const PlannedBay& bay : layout.bays) {
     const double half_x = 0.5 * kBayWidth_m;
     const double half_y = 0.5 * kGarageBayLength_m;
     painter.line(bay.x - half_x, bay.y - half_y, bay.x - half_x, bay.y + half_y, kLine_m);

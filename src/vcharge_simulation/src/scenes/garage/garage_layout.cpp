@@ -28,7 +28,8 @@ void addBays(GarageLayout* layout) {
         const double x = plan.firstBay() + (i + 0.5) * kBayWidth_m;
         const bool keep_free =
             side < 0.0 && across == kOuterBays_m && std::abs(x - plan.free_bay_x_m) < 0.5 * kBayWidth_m;
-        layout->bays.push_back({x, plan.shifted(side * across), yaw_rad, number++, keep_free});
+        layout->bays.push_back({x, plan.shifted(side * across), yaw_rad, number++, keep_free,
+                                BayKind::kPerpendicular, false, kGarageBayLength_m});
       }
     }
   }

@@ -21,7 +21,7 @@ struct GarageLayout {
   };
 
   GaragePlan plan;
-  std::vector<ParkingBay> bays;
+  std::vector<PlannedBay> bays;
   std::vector<ParkedCar> cars;
   std::vector<Pillar> pillars;
   std::vector<double> beam_x;  ///< beams across the garage

@@ -77,6 +77,7 @@ class GarageBuilder {
     bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
     addCeilingReflection();
     scene().vehicle_lamps = vehicleLampsOf(conditions_, kFullIlluminance_lx / kFullIrradiance);
+    scene().bays = paintedBays(layout_.bays, layout_.cars);
     addMovers(options_, {plan_.area, plan_.lanes, layout_.bays}, &parts_);
     return parts_.sharedScene();
   }

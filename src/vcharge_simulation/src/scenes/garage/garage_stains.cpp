@@ -41,9 +41,9 @@ class StainPainter {
 
   const cv::Mat& image() const { return image_; }
 
-  void addOil(const std::vector<ParkingBay>& bays) {
+  void addOil(const std::vector<PlannedBay>& bays) {
     // Oil drips from parked engines: pools with drops around them.
-    for (const ParkingBay& bay : bays) {
+    for (const PlannedBay& bay : bays) {
       for (int i = random_.index(4); i > 0; --i) {
         const double x = bay.x + random_.uniform(-0.6, 0.6);
         const double y = bay.y + random_.uniform(-2.0, 2.0);
@@ -105,8 +105,8 @@ class StainPainter {
   }
 
   // Tyre marks of cars that turned from the lane into a bay or out of it.
-  void addTyreMarks(const std::vector<ParkingBay>& bays) {
-    for (const ParkingBay& bay : bays) {
+  void addTyreMarks(const std::vector<PlannedBay>& bays) {
+    for (const PlannedBay& bay : bays) {
       const double lane_y = nearestLane(bay);
       const double towards = bay.y > lane_y ? 1.0 : -1.0;
       for (int i = random_.index(4); i > 0; --i) {
@@ -135,7 +135,7 @@ class StainPainter {
     }
   }
 
-  double nearestLane(const ParkingBay& bay) const {
+  double nearestLane(const PlannedBay& bay) const {
     // The open end of a bay is opposite to the direction of its yaw.
     const double mouth_y = bay.y - (bay.yaw_rad > 0.0 ? 0.5 : -0.5) * kGarageBayLength_m;
     const double lanes[] = {-plan_.lanes.y_m, 0.0, plan_.lanes.y_m};

@@ -11,7 +11,6 @@ namespace vcharge {
 namespace {
 
 constexpr double kHalfPi = 1.57079632679489661923;
-constexpr double kParallelBay_m = 6.2;
 constexpr double kEdge_m = 29.0;   // half the extent across the lanes
 constexpr double kEdgeX_m = 39.0;  // half the extent along them
 constexpr double kLarge_m = 1e3;
@@ -75,7 +74,7 @@ class LotDrawer {
       inset_m = 0.5 * kBayLength_m * std::cos(plan_.bay_angle_rad);
     } else if (kind == BayKind::kParallel) {
       yaw_rad = into > 0.0 ? 0.0 : 2.0 * kHalfPi;
-      spacing_m = kParallelBay_m;
+      spacing_m = kParallelLength_m;
     }
     const int count = static_cast<int>(2.0 * (half_m - inset_m) / spacing_m + 1e-6);
     const int tree_every = may_have_trees && random_.chance(0.5) ? 4 + random_.index(3) : 1000;
@@ -89,7 +88,7 @@ class LotDrawer {
       }
       const bool keep_free = y < -plan_.half_middle_aisle_m && into > 0.0 &&
                              std::abs(x - plan_.free_bay_x_m) < 0.5 * kBayWidth_m;
-      layout_.bays.push_back({x, y, yaw_rad, number_++, keep_free, kind != BayKind::kPerpendicular});
+      layout_.bays.push_back({x, y, yaw_rad, number_++, keep_free, kind, into > 0.0});
     }
   }
 

@@ -21,7 +21,7 @@ struct PavedArea {
 
 /// Positions of everything on the lot.
 struct LotLayout {
-  using Bay = ParkingBay;
+  using Bay = PlannedBay;
 
   Lanes lanes;
   std::vector<PavedArea> paving;  ///< the first area counts; asphalt elsewhere

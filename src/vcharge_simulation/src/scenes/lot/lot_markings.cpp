@@ -10,10 +10,10 @@ namespace {
 constexpr double kHalfPi = 1.57079632679489661923;
 
 // Both sides of a bay that is angled or parallel to its lane, and the ends of a parallel one.
-void addOutline(const ParkingBay& bay, double line_m, MarkingPainter* painter) {
-  const bool is_parallel = std::abs(std::sin(bay.yaw_rad)) < 1e-6;
-  const double half_length = is_parallel ? 3.1 : 0.5 * kBayLength_m;
-  const double half_width = is_parallel ? 1.15 : 0.5 * kBayWidth_m;
+void addOutline(const PlannedBay& bay, double line_m, MarkingPainter* painter) {
+  const bool is_parallel = bay.kind == BayKind::kParallel;
+  const double half_length = 0.5 * (is_parallel ? kParallelLength_m : kBayLength_m);
+  const double half_width = 0.5 * (is_parallel ? kParallelWidth_m : kBayWidth_m);
   const auto corners = orientedRectangle(bay.x, bay.y, bay.yaw_rad, -half_length, half_length, half_width);
   for (size_t i = 0; i < corners.size(); ++i) {
     if (is_parallel || i % 2 == 0) {
@@ -29,7 +29,7 @@ cv::Mat drawLotMarkings(const LotLayout& layout, double texel_m, uint64_t seed) 
   MarkingPainter painter(kLotArea, texel_m);
   constexpr double kLine_m = 0.12;
   for (const LotLayout::Bay& bay : layout.bays) {
-    if (bay.is_oblique) {
+    if (bay.kind != BayKind::kPerpendicular) {
       addOutline(bay, kLine_m, &painter);
       continue;
     }

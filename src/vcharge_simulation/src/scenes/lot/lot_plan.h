@@ -3,11 +3,9 @@
 #include <cstdint>
 
 #include "scenes/lane_paths.h"
+#include "vcharge_core/dense_maps/parking_bay.h"
 
 namespace vcharge {
-
-/// How the bays of a row lie.
-enum class BayKind { kPerpendicular, kAngled, kParallel };
 
 /// Sizes of a lot whose two double rows of bays lie between three lanes, mirrored at y = 0. The aisle at y =
 /// -lanes.y_m serves the drives into bays: its bays are perpendicular and it is at least 6 m wide.

@@ -75,6 +75,7 @@ class LotBuilder {
     bakeGroundLight(-corner_m, corner_m, kLightTexel_m / options_.detail, ground_height, &scene());
     bakeGroundLamps(-corner_m, corner_m, kLightTexel_m / options_.detail, ground_height, &scene());
     scene().vehicle_lamps = vehicleLampsOf(conditions_, kSunIlluminance_lx);
+    scene().bays = paintedBays(layout_.bays, layout_.cars);
     addMovers(options_, {kLotArea, layout_.lanes, baysToLeave(layout_.bays)}, &parts_);
     return parts_.sharedScene();
   }

@@ -67,7 +67,7 @@ DrivePath driveAround(const MoverArea& area, double aside_m, double total_m, Ran
   return repeated(DrivePath::throughWaypoints(corners, true, kCornerRadius_m, kTransition_m), total_m);
 }
 
-std::optional<DrivePath> leaveBay(const MoverArea& area, const ParkingBay& bay, double axle_m, double aside_m,
+std::optional<DrivePath> leaveBay(const MoverArea& area, const PlannedBay& bay, double axle_m, double aside_m,
                                   bool to_left) {
   const Eigen::Vector2d out(-std::cos(bay.yaw_rad), -std::sin(bay.yaw_rad));
   const double side = out.y() > 0.0 ? 1.0 : -1.0;

@@ -15,7 +15,7 @@ namespace vcharge {
 struct MoverArea {
   GroundRectangle bounds;
   Lanes lanes;
-  std::vector<ParkingBay> bays;
+  std::vector<PlannedBay> bays;
   bool is_road = false;  ///< the only lane is along y = 0 and not closed
 };
 
@@ -29,7 +29,7 @@ DrivePath driveAround(const MoverArea& area, double aside_m, double total_m, Ran
 
 /// A drive forwards out of a bay and on along the lanes; `axle_m` is the distance of the rear axle from the
 /// middle of the car. Nothing if the bay is too near to a corner.
-std::optional<DrivePath> leaveBay(const MoverArea& area, const ParkingBay& bay, double axle_m, double aside_m,
+std::optional<DrivePath> leaveBay(const MoverArea& area, const PlannedBay& bay, double axle_m, double aside_m,
                                   bool to_left);
 
 }  // namespace vcharge
