@@ -90,6 +90,52 @@ class HeightMapTest(unittest.TestCase):
         self.assertIn("taken: expected a folder, is a file", errors[-1])
         self.assertEqual(path.read_text(), "mine")
 
+    def painted_map(self, name, gray=True, cell_m=0.05):
+        """A height map of level ground with five painted bays in 20 m by 20 m; the middle one holds a car."""
+        folder = self.drive.folder / name
+        folder.mkdir()
+        heights, levels = np.zeros((400, 400), np.float32), np.full((400, 400), 90, np.uint8)
+        for number in range(6):
+            levels[200:296, 100 + 50 * number:103 + 50 * number] = 180
+        heights[210:290, 208:246] = 1.2
+        cv2.imwrite(str(folder / "height_map.tiff"), heights)
+        cv2.imwrite(str(folder / "gray.png"), levels)
+        (folder / "height_map.yaml").write_text(
+            "file: height_map.tiff\nframe: map\norigin_m: [-5, -10]\nsize_cells: [400, 400]\n"
+            f"cell_size_m: {cell_m}\n" + ("gray_file: gray.png\n" if gray else ""))
+        return folder
+
+    def test_bays_are_found_in_a_height_map(self):
+        words = [tool("vcharge_dense", "map_bays"), "--height-map", self.painted_map("painted"), "--output"]
+        path = self.drive.folder / "bays.yaml"
+        status, found, errors = run_tool([*words, path])
+        self.assertEqual((status, errors), (0, []))
+        self.assertEqual([found[key] for key in ("num_bays", "num_rows", "num_free", "num_occupied", "num_unknown")],
+                         [5, 1, 4, 1, 0])
+        content = yaml.safe_load(path.read_text())
+        self.assertEqual((content["frame"], content["content_hash"]), ("map", found["content_hash"]))
+        middle = content["bays"][2]
+        self.assertEqual((middle["kind"], middle["state"]), ("perpendicular", "occupied"))
+        self.assertAlmostEqual(np.mean(middle["corners_m"], 0)[0], 6.3, delta=0.1)
+        again = self.drive.folder / "again.yaml"
+        run_tool([*words, again])
+        self.assertEqual(again.read_bytes(), path.read_bytes())
+
+    def test_a_map_without_paint_has_no_bays(self):
+        status, found, _ = run_tool([tool("vcharge_dense", "map_bays"), "--height-map", self.saved, "--output",
+                                     self.drive.folder / "none.yaml"])
+        self.assertEqual((status, found["num_bays"]), (0, 0))
+
+    def test_maps_in_which_lines_cannot_be_seen_are_refused(self):
+        for name, words, arguments in (("no_gray", "gray_file: expected", {"gray": False}),
+                                       ("coarse", "cell_size_m: expected at most 0.1 m", {"cell_m": 0.2})):
+            folder, output = self.painted_map(name, **arguments), self.drive.folder / f"{name}.yaml"
+            status, _, errors = run_tool([tool("vcharge_dense", "map_bays"), "--height-map", folder, "--output", output])
+            self.assertEqual((status, len(errors)), (1, 1))
+            self.assertIn(str(folder), errors[0])
+            self.assertIn(words, errors[0])
+            self.assertFalse(output.exists())
+
     def test_nodelet_equals_the_tool(self):
         output = self.drive.folder / "online"
         rospy.set_param("/height_map/rig", str(self.drive.rig))

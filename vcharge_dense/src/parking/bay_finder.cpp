@@ -1,0 +1,143 @@
+#include "vcharge_dense/bay_finder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
+
+#include "parking/bay_rows.h"
+#include "parking/ground_image.h"
+#include "parking/paint_lines.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/quantile.h"
+
+namespace vcharge {
+namespace {
+
+/// Corners of the bay after a divider, counter-clockwise from above.
+std::array<Eigen::Vector2d, 4> cornersOf(const BayRow& row, size_t index) {
+  const Eigen::Vector2d near_m = row.entry_m + static_cast<double>(index) * row.step_m;
+  const Eigen::Vector2d next_m = near_m + row.step_m;
+  const bool is_left = row.step_m.x() * row.depth_m.y() - row.step_m.y() * row.depth_m.x() > 0.0;
+  return is_left ? std::array<Eigen::Vector2d, 4>{near_m, next_m, next_m + row.depth_m, near_m + row.depth_m}
+                 : std::array<Eigen::Vector2d, 4>{next_m, near_m, near_m + row.depth_m, next_m + row.depth_m};
+}
+
+/// Cells of a quadrangle, as a mask of its bounding box.
+struct Cells {
+  cv::Rect box;
+  cv::Mat inside;  ///< CV_8UC1
+};
+
+Cells cellsOf(const GroundImage& ground, const std::array<Eigen::Vector2d, 4>& corners_m) {
+  std::vector<cv::Point> outline;
+  for (const Eigen::Vector2d& corner_m : corners_m) {
+    const Eigen::Vector2d cell = ground.cellOf(corner_m);
+    outline.emplace_back(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
+  }
+  Cells cells;
+  cells.box = cv::boundingRect(outline) & cv::Rect({0, 0}, ground.isGround().size());
+  cells.inside = cv::Mat(cells.box.size(), CV_8UC1, cv::Scalar(0));
+  if (!cells.box.empty()) {
+    cv::fillPoly(cells.inside, std::vector<std::vector<cv::Point>>{outline}, cv::Scalar(1), cv::LINE_8, 0,
+                 -cells.box.tl());
+  }
+  return cells;
+}
+
+/// A part of a bay, from fractions of its width and of its length from the entry on.
+std::array<Eigen::Vector2d, 4> partOf(const ParkingBay& bay, double from_side, double to_side,
+                                      double from_entry, double to_entry) {
+  const auto& c = bay.corners_m;
+  const auto at = [&](double side, double in) -> Eigen::Vector2d {
+    const Eigen::Vector2d entry_m = c[0] + side * (c[1] - c[0]), end_m = c[3] + side * (c[2] - c[3]);
+    return entry_m + in * (end_m - entry_m);
+  };
+  return {at(from_side, from_entry), at(to_side, from_entry), at(to_side, to_entry), at(from_side, to_entry)};
+}
+
+/// Height of the ground around a bay. NaN if none is seen.
+double groundHeight(const HeightMap& map, const GroundImage& ground, cv::Rect box) {
+  constexpr double kAround_m = 2.0;
+  const int margin = static_cast<int>(kAround_m / map.cell_size_m);
+  box = cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
+        cv::Rect({0, 0}, map.height_m.size());
+  std::vector<double> heights;
+  for (int row = box.y; row < box.br().y; ++row) {
+    for (int column = box.x; column < box.br().x; ++column) {
+      if (ground.isGround().at<float>(row, column) > 0.0F) {
+        heights.push_back(map.height_m.at<float>(row, column));
+      }
+    }
+  }
+  return heights.empty() ? std::numeric_limits<double>::quiet_NaN() : quantile(std::move(heights), 0.5);
+}
+
+/// What stands in a bay. A car reaches beyond the middle of its bay whichever way it is parked, so that bare
+/// ground there means that the bay is free.
+BayState stateOf(const HeightMap& map, const GroundImage& ground, const ParkingBay& bay) {
+  constexpr double kMinHeight_m = 0.25, kMaxHeight_m = 2.5, kMinCar_m2 = 0.6, kMinSeen = 0.5;
+  // Cars beside the bay may reach over its lines, and there may be wheel stops or a wall at its end.
+  const Cells inner = cellsOf(ground, partOf(bay, 0.15, 0.85, 0.0, 0.9));
+  const Cells middle = cellsOf(ground, partOf(bay, 0.15, 0.85, 0.3, 0.6));
+  if (inner.box.empty() || middle.box.empty()) {
+    return BayState::kUnknown;
+  }
+  const double ground_m = groundHeight(map, ground, inner.box);
+  int num_raised = 0;
+  for (int row = 0; row < inner.inside.rows; ++row) {
+    for (int column = 0; column < inner.inside.cols; ++column) {
+      const cv::Point cell(inner.box.x + column, inner.box.y + row);
+      const double height_m = map.height_m.at<float>(cell) - ground_m;
+      const bool is_solid = !map.solid.empty() && map.solid.at<uint8_t>(cell) != 0;
+      num_raised += inner.inside.at<uint8_t>(row, column) != 0 &&
+                            (is_solid || (height_m > kMinHeight_m && height_m < kMaxHeight_m))
+                        ? 1
+                        : 0;
+    }
+  }
+  if (num_raised * map.cell_size_m * map.cell_size_m >= kMinCar_m2) {
+    return BayState::kOccupied;
+  }
+  const double seen = cv::mean(ground.isGround()(middle.box), middle.inside)[0];
+  return seen >= kMinSeen ? BayState::kFree : BayState::kUnknown;
+}
+
+}  // namespace
+
+ParkingBays findBays(const HeightMap& map) {
+  constexpr double kLargestCell_m = 0.1;
+  if (map.gray.empty()) {
+    throw InputError("gray_file: expected gray levels, in which lines are seen");
+  }
+  if (map.cell_size_m > kLargestCell_m) {
+    throw InputError("cell_size_m: expected at most 0.1 m, the width of a painted line");
+  }
+  const GroundImage ground(map);
+  ParkingBays result;
+  result.frame_id = map.frame_id;
+  uint32_t row_number = 0;
+  for (const BayRow& row : findBayRows(ground, findPaintLines(ground))) {
+    bool has_bay = false;
+    for (size_t i = 0; i + 1 < row.dividers.size(); ++i) {
+      ParkingBay bay;
+      bay.id = static_cast<uint32_t>(result.bays.size() + 1);
+      bay.row = row_number;
+      bay.kind = row.kind;
+      bay.corners_m = cornersOf(row, i);
+      bay.entry_sigma_m = row.entry_sigma_m;
+      bay.end_sigma_m = row.end_sigma_m;
+      const int num_seen = (row.dividers[i].is_seen ? 1 : 0) + (row.dividers[i + 1].is_seen ? 1 : 0);
+      bay.confidence = (0.5 + 0.25 * num_seen) * (row.dividers.size() > 2 ? 1.0 : 0.7);
+      bay.state = stateOf(map, ground, bay);
+      result.bays.push_back(bay);
+      has_bay = true;
+    }
+    row_number += has_bay ? 1 : 0;
+  }
+  return result;
+}
+
+}  // namespace vcharge
