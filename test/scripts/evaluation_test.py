@@ -27,7 +27,7 @@ from sensor_msgs.msg import Image
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
 from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
-from vcharge_evaluation import consistency, drives, graphs, obstacles, pose_graphs, poses, results  # noqa: E402
+from vcharge_evaluation import bays, consistency, drives, graphs, obstacles, pose_graphs, poses, results  # noqa: E402
 from vcharge_evaluation import spoiled_drives, tools  # noqa: E402
 from vcharge_evaluation.camera_models import project  # noqa: E402
 from vcharge_evaluation.live import flame_graph, processes  # noqa: E402
@@ -284,9 +284,42 @@ manager 1 2.2: 5 cycles:
         xml.etree.ElementTree.fromstring(graph)
 
 
+class BaysTest(unittest.TestCase):
+    @staticmethod
+    def row(shift_m, states, first=0.0):
+        """Bays of 2.5 m by 5 m north of a lane along x."""
+        found = []
+        for number, state in enumerate(states):
+            left = first + 2.5 * number
+            corners = [[left, 3.0], [left + 2.5, 3.0], [left + 2.5, 8.0], [left, 8.0]]
+            found.append(bays.Bay({"kind": "perpendicular", "state": state, "entry_sigma_m": 0.05, "end_sigma_m": 0.05,
+                                   "corners_m": [[x + shift_m, y] for x, y in corners]}))
+        return found
+
+    def figures_of(self, found, true, drive_y=0.0):
+        positions = np.column_stack([np.arange(0.0, 10.0, 0.1), np.full(100, drive_y)])
+        return {one.name: one.value for one in bays.figures(found, true, positions)}
+
+    def test_bays_are_compared_corner_by_corner(self):
+        figures = self.figures_of(self.row(0.1, ["free", "occupied", "unknown"]), self.row(0.0, ["free"] * 4))
+        self.assertEqual(figures["bays that the drive passes"], 4)
+        self.assertEqual(figures["of them found"], 75)
+        self.assertEqual(figures["bays found that there are"], 100)
+        self.assertAlmostEqual(figures["corners, 95 %"], 10)
+        self.assertAlmostEqual(figures["corners, normalized error squared"], 2)  # 4 across, 0 along
+        self.assertEqual(figures["free or occupied right, of those known"], 50)
+        self.assertAlmostEqual(figures["free or occupied not known"], 100 / 3)
+
+    def test_other_markings_and_bays_seen_from_behind_do_not_count_as_found(self):
+        figures = self.figures_of(self.row(1.4, ["free"] * 2), self.row(0.0, ["free"]))
+        self.assertEqual((figures["of them found"], figures["bays found that there are"]), (0, 0))
+        self.assertEqual(self.figures_of([], self.row(0.0, ["free"]), drive_y=11.0)["bays that the drive passes"], 0)
+        self.assertIsNone(self.figures_of([], [])["corners, median"])
+
+
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
-        for stage in ("masks", "calibration", "mapping", "localization", "living_map", "ranges", "height_map", "obstacles",
+        for stage in ("masks", "calibration", "mapping", "localization", "living_map", "ranges", "height_map", "bays", "obstacles",
                       "objects", "conditions", "faults", "chain", "online", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)

@@ -13,6 +13,7 @@ STAGES = {
     "shutters": "shutters",
     "ranges": "ranges",
     "height_map": "height_map",
+    "bays": "bays",
     "obstacles": "obstacles",
     "objects": "objects",
     "standing": "standing",

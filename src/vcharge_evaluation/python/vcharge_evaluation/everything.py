@@ -11,6 +11,7 @@ import time
 
 from vcharge_evaluation import page
 from vcharge_evaluation.conditions import DRIVING_QUICK, all_scenarios
+from vcharge_evaluation.drives import CONDITIONS
 from vcharge_evaluation.results import RESULTS, commit, drop_others
 from vcharge_evaluation.tools import ROOT, say
 
@@ -57,6 +58,8 @@ def steps():
                         "--no-experiments"] if first else None)
             yield Step("localization", [*words, "--image-scale", 0.25, "--consistency", 20],
                        [*words, "--image-scale", QUICK_SCALE, "--consistency", 5] if first else None)
+    yield Step("bays", ["--drives", *(f"lot:{seed}" for seed in LOTS), *(f"garage:{seed}" for seed in GARAGES), "--conditions",
+                        *CONDITIONS])
     yield Step("standing", ["--seeds", LOTS[0]])
     yield Step("steps", ["--seeds", *LOTS])
     # The quick run's drives are those of its conditions.

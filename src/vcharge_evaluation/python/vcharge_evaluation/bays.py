@@ -1,0 +1,123 @@
+"""Parking bays: how many of those that a drive passes are found, how far their corners are off, and whether they are free."""
+import argparse
+
+import cv2
+import numpy as np
+import yaml
+
+from vcharge_evaluation.drives import CONDITIONS, LOOP_STEP, Drive
+from vcharge_evaluation.localization_errors import Map
+from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
+from vcharge_evaluation.tools import CONFIG, run_tool, say
+
+REACH_M = 8.0  # a drive passes a bay if it comes this near to its entry, from in front
+IN_FRONT = 0.5  # cosine of the largest angle to the entry's normal
+SAME_BAY = 0.5  # area in common over that of both
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_arguments(parser, "bay_evaluation")
+    parser.add_argument("--drives", nargs="*", default=["lot:201", "garage:211"], metavar="SCENE:SEED")
+    parser.add_argument("--conditions", nargs="*", default=["noon"], choices=CONDITIONS, help="of lots")
+    parser.add_argument("--image-scale", type=float, default=0.5)
+    parser.add_argument("--duration-s", type=float, default=0.0, help="end the drives early; 0: whole loops")
+    return parser.parse_args()
+
+
+class Bay:
+    def __init__(self, entry, mapped=None):
+        self.kind, self.state = entry["kind"], entry["state"]
+        self.corners = np.array(entry["corners_m"])
+        self.sigmas = np.array([entry["entry_sigma_m"]] * 2 + [entry["end_sigma_m"]] * 2)
+        if mapped is not None:
+            flat = np.column_stack([self.corners, np.full(4, mapped.positions[:, 2].mean())])
+            self.corners = (flat @ mapped.turn.T + mapped.shift)[:, :2]
+        self.entry = self.corners[:2].mean(0)
+
+    def is_passed(self, positions):
+        """Whether a drive comes near to the entry from in front."""
+        along = self.corners[1] - self.corners[0]
+        out = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+        away = positions - self.entry
+        distance = np.linalg.norm(away, axis=1)
+        return bool(((away @ out > IN_FRONT * distance) & (distance < REACH_M)).any())
+
+    def overlap(self, other):
+        """Area in common over that of both."""
+        mine, others = np.float32(self.corners), np.float32(other.corners)
+        common = cv2.intersectConvexConvex(mine, others)[0]
+        return common / (cv2.contourArea(mine) + cv2.contourArea(others) - common)
+
+
+def bays_of(path, mapped=None):
+    return [Bay(entry, mapped) for entry in yaml.safe_load(path.read_text(encoding="utf-8"))["bays"]]
+
+
+def pairs_of(found, true):
+    """Indices of found bays and of the true ones that they lie on, the best pairs first."""
+    overlaps = np.array([[bay.overlap(other) for other in true] for bay in found]).reshape(len(found), len(true))
+    pairs = []
+    while overlaps.size and overlaps.max() >= SAME_BAY:
+        row, column = np.unravel_index(overlaps.argmax(), overlaps.shape)
+        pairs.append((row, column))
+        overlaps[row, :] = overlaps[:, column] = 0
+    return pairs
+
+
+def figures(found, true, positions):
+    """Found bays, the true ones, and the positions of the drive."""
+    pairs = pairs_of(found, true)
+    passed = {column for column, bay in enumerate(true) if bay.is_passed(positions)}
+    hits = [(found[row], true[column]) for row, column in pairs if column in passed]
+    errors = np.array([np.linalg.norm(bay.corners - other.corners, axis=1) for bay, other in hits]).reshape(-1, 4)
+    known = [(bay, other) for bay, other in hits if bay.state != "unknown"]
+    normalized = [(bay.corners - other.corners) / bay.sigmas[:, None] for bay, other in hits]
+
+    def quantile(values, which):
+        return 100 * float(np.percentile(values, which)) if len(values) else None
+    return [
+        Figure("bays that the drive passes", len(passed)),
+        figure("of them found", percent(len(hits), len(passed)), "%", at_least=95),
+        figure("bays found that there are", percent(len(pairs), len(found)), "%", at_least=98),
+        figure("corners, median", quantile(errors, 50), "cm", at_most=10),
+        figure("corners, 95 %", quantile(errors, 95), "cm", at_most=25),
+        Figure("corners at the entry, median", quantile(errors[:, :2], 50), "cm"),
+        Figure("corners at the entry, 95 %", quantile(errors[:, :2], 95), "cm"),
+        Figure("corners, normalized error squared", float(np.mean(np.square(normalized))) if hits else None),
+        Figure("kind right", percent(sum(bay.kind == other.kind for bay, other in hits), len(hits)), "%"),
+        figure("free or occupied right, of those known", percent(sum(bay.state == other.state for bay, other in known), len(known)),
+               "%", at_least=98),
+        Figure("free or occupied not known", percent(len(hits) - len(known), len(hits)), "%")]
+
+
+def evaluate(args, scene, seed, condition):
+    words = ("--set", f"condition.kind={condition}") if condition != "noon" else ()
+    drive = Drive(args.work, f"{scene}_bays", "--scene", scene, "--drive", "loop", "--scene-seed", seed, "--seed", seed,
+                  "--image-scale", args.image_scale, "--image-step", LOOP_STEP,
+                  *(["--duration-s", args.duration_s] if args.duration_s else []), *words)
+    path, trajectory, _ = drive.map(drive.true_rig)
+    say(f"{drive.folder}: height map and bays")
+    run_tool("build_height_map", drive.folder / "height_map.log", "--bag", drive.bag, "--rig", drive.true_rig, "--trajectory",
+             trajectory, "--options", CONFIG / "height_map.yaml", "--output", drive.folder / "height_map")
+    made = run_tool("map_bays", drive.folder / "bays.log", "--height-map", drive.folder / "height_map", "--output",
+                    drive.folder / "bays.yaml")
+    found = bays_of(drive.folder / "bays.yaml", Map(path, drive.trajectory))
+    return [*figures(found, bays_of(drive.truth / "bays.yaml"), np.loadtxt(drive.trajectory)[:, 1:3]),
+            Figure("time", made.wall_s, "s")]
+
+
+def main():
+    args = arguments()
+    args.work.mkdir(parents=True, exist_ok=True)
+    results = Results("bays", "Parking bays", args)
+    for name in args.drives:
+        scene, _, seed = name.partition(":")
+        for condition in args.conditions if scene == "lot" else ["noon"]:
+            results.add(f"{scene.capitalize()}s, {condition}, image scale {args.image_scale:g}",
+                        (f"{scene} {seed}", evaluate(args, scene, int(seed), condition)))
+    results.end()
+
+
+if __name__ == "__main__":
+    main()
