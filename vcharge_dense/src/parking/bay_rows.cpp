@@ -25,12 +25,20 @@ class RowMaker {
 
   void addRows(const LatticeSearch& search, const FoundLattice& found, std::vector<BayRow>* rows) const {
     BayLattice lattice = found.lattice;
-    const DividerLength length = lengthOf(ground_, lattice, found.lines, sizes_);
     int first = 0;
     const Dividers dividers = dividersOf(search, found, &first);
     const int last = first + static_cast<int>(dividers.size()) - 1;
-    const Eigen::Vector2d depth_m = length.length_m * lattice.into;
-    if (length.length_m <= sizes_.max_length &&
+    std::vector<int> seen;
+    for (int number = first; number <= last; ++number) {
+      const auto& divider = dividers[static_cast<size_t>(number - first)];
+      if (divider && divider->is_seen) {
+        seen.push_back(number);
+      }
+    }
+    const DividerExtent extent = extentOf(ground_, lattice, seen, paleContrast(found.lines), sizes_);
+    lattice.entry_m += extent.begin_m * lattice.into;
+    const Eigen::Vector2d depth_m = extent.length_m() * lattice.into;
+    if (extent.length_m() <= sizes_.max_length &&
         groundBefore(lattice, depth_m, lattice.into, first, last) >
             groundBefore(lattice, Eigen::Vector2d::Zero(), -lattice.into, first, last)) {
       // The lane is at the other ends.
@@ -45,7 +53,7 @@ class RowMaker {
       }
       if (number == last || !divider || isIsland(lattice, number)) {
         const int begin = number + (divider ? 1 : 0) - static_cast<int>(together.size());
-        addRow(lattice, length, begin, std::move(together), rows);
+        addRow(lattice, extent, begin, std::move(together), rows);
         together.clear();
       }
     }
@@ -182,7 +190,7 @@ class RowMaker {
     return 2 * num_sides >= num_bays;
   }
 
-  void addRow(const BayLattice& lattice, const DividerLength& length, int first,
+  void addRow(const BayLattice& lattice, const DividerExtent& extent, int first,
               std::vector<BayDivider> dividers, std::vector<BayRow>* rows) const {
     BayRow row;
     row.dividers = std::move(dividers);
@@ -202,19 +210,19 @@ class RowMaker {
       return;
     }
     constexpr double kRightAngle_sine = 0.966;  // 75 degrees
-    const bool is_double = length.length_m > sizes_.max_length;
+    const bool is_double = extent.length_m() > sizes_.max_length;
     row.kind = sizes_.areParallelToLane()           ? BayKind::kParallel
                : lattice.sine() >= kRightAngle_sine ? BayKind::kPerpendicular
                                                     : BayKind::kAngled;
     row.entry_m = lattice.entryOf(first);
     row.step_m = lattice.step_m;
-    row.depth_m = (is_double ? 0.5 : 1.0) * length.length_m * lattice.into;
-    row.is_end_seen = length.is_seen;
+    row.depth_m = (is_double ? 0.5 : 1.0) * extent.length_m() * lattice.into;
+    row.is_end_seen = extent.is_end_seen;
     row.entry_sigma_m = kEntrySigma_m;
-    row.end_sigma_m = std::hypot(kEntrySigma_m, length.sigma_m);
+    row.end_sigma_m = std::hypot(kEntrySigma_m, extent.end_sigma_m);
     rows->push_back(row);
     if (is_double) {  // two rows back to back
-      row.entry_m += length.length_m * lattice.into;
+      row.entry_m += extent.length_m() * lattice.into;
       row.depth_m = -row.depth_m;
       rows->push_back(row);
     }

@@ -1,7 +1,7 @@
 #include "parking/divider_paint.h"
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
 #include <vector>
 
 #include "vcharge_core/base/quantile.h"
@@ -11,26 +11,17 @@ namespace {
 
 constexpr double kPaintRatio = 0.5, kBareRatio = 0.3;  // contrast over that of a line
 
-/// Whether paint ends here: the ground beyond is seen and bare, or a kerb.
-bool isEnd(const GroundImage& ground, const DividerLine& candidate) {
-  const Eigen::Vector2d along = candidate.direction(), across = rightOf(along);
-  constexpr double kMinKerb_m = 0.04, kMaxKerb_m = 0.4, kInside_m = 0.3;
-  const float ground_m = ground.height_m(candidate.far_m - kInside_m * along);
-  int visible = 0;
-  for (const double beyond_m : {0.15, 0.25, 0.35, 0.45}) {
-    const Eigen::Vector2d position_m = candidate.far_m + beyond_m * along;
-    const float step_m = ground.height_m(position_m) - ground_m;
-    if (!ground.at(position_m) && step_m > kMinKerb_m && step_m < kMaxKerb_m) {
-      ++visible;
-      continue;
+/// Paint at a place of a line that is known to some centimetres only. Nothing unless both sides are seen.
+std::optional<double> contrastNear(const GroundImage& ground, const Eigen::Vector2d& position_m,
+                                   const Eigen::Vector2d& across) {
+  std::optional<double> best;
+  for (const double offset_m : {-0.05, 0.0, 0.05}) {
+    const auto found = ground.lineContrast(position_m + offset_m * across, across);
+    if (found && found->to_left && found->to_right) {
+      best = std::max(best.value_or(found->smaller()), found->smaller());
     }
-    const auto contrast = ground.lineContrast(position_m, across);
-    if (contrast && contrast->smaller() > kPaintRatio * candidate.contrast) {
-      return false;
-    }
-    visible += contrast && contrast->isEven(candidate.contrast) ? 1 : 0;
   }
-  return visible >= 3;
+  return best;
 }
 
 }  // namespace
@@ -65,51 +56,65 @@ double paleContrast(const LatticeLines& lines) {
   return quantile(contrasts, 0.25);
 }
 
-DividerLength lengthOf(const GroundImage& ground, const BayLattice& lattice, const LatticeLines& lines,
-                       const BaySizes& sizes) {
-  constexpr double kEndSigma_m = 0.06, kSmallestSigma_m = 0.03, kAgree_m = 0.25;
-  struct End {
-    double at_m;
-    bool is_seen;
+DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, const std::vector<int>& numbers,
+                       double line_contrast, const BaySizes& sizes) {
+  constexpr double kBefore_m = 2.0, kMinContrast = 0.02, kBareRun_m = 0.3, kUnseenRun_m = 0.5;
+  constexpr double kSeenSigma_m = 0.06;
+  constexpr size_t kMinDividers = 2;
+  const double step_m = ground.cellSize_m();
+  const double least = std::max(kMinContrast, kBareRatio * line_contrast);
+  const Eigen::Vector2d across = rightOf(lattice.into);
+  enum class Seen { kPaint, kBare, kNothing };
+  const auto seenAt = [&](double along_m) {
+    std::vector<double> contrasts;
+    for (const int number : numbers) {
+      if (const auto found = contrastNear(ground, lattice.entryOf(number) + along_m * lattice.into, across)) {
+        contrasts.push_back(*found);
+      }
+    }
+    if (contrasts.size() < kMinDividers) {
+      return Seen::kNothing;
+    }
+    // The lower median: another marking may prolong one line.
+    std::sort(contrasts.begin(), contrasts.end());
+    return contrasts[(contrasts.size() - 1) / 2] >= least ? Seen::kPaint : Seen::kBare;
   };
-  std::vector<End> ends;
-  for (const auto& [index, candidate] : lines) {
-    const double at_m = lattice.coordinatesOf(candidate.far_m).y();
-    ends.push_back({at_m, at_m >= sizes.min_length && isEnd(ground, candidate)});
-  }
-  // Lines that end in the same place vote for it, and longer ones against it.
-  int most_votes = 0;
-  std::vector<double> agreeing_m;
-  for (const End& end : ends) {
-    std::vector<double> same_m;
-    int votes = 0;
-    for (const End& other : ends) {
-      if (end.is_seen && other.is_seen && std::abs(other.at_m - end.at_m) <= kAgree_m) {
-        same_m.push_back(other.at_m);
-        ++votes;
+  // Goes on from a painted place until the ground is bare, or nothing is seen.
+  const auto walk = [&](double from_m, double to_m, bool* is_end) {
+    const double direction = to_m > from_m ? 1.0 : -1.0;
+    double last_m = from_m, bare_m = 0.0, unseen_m = 0.0;
+    *is_end = false;
+    for (double at_m = from_m; direction * (to_m - at_m) > 0.0; at_m += direction * step_m) {
+      const Seen seen = seenAt(at_m);
+      if (seen == Seen::kPaint) {
+        last_m = at_m;
+        bare_m = unseen_m = 0.0;
       }
-      votes -= other.at_m > end.at_m + kAgree_m ? 1 : 0;
-    }
-    if (votes > most_votes) {
-      most_votes = votes;
-      agreeing_m = same_m;
-    }
-  }
-  if (agreeing_m.empty()) {
-    // What hides the ends may leave one line, but a longer line may also be another marking.
-    double longest_m = sizes.usual_length;
-    for (const End& end : ends) {
-      const auto as_long = std::count_if(ends.begin(), ends.end(),
-                                         [&](const End& other) { return other.at_m >= end.at_m - kAgree_m; });
-      if (as_long >= 2 && 2 * as_long >= static_cast<std::ptrdiff_t>(ends.size()) &&
-          end.at_m <= sizes.max_length) {
-        longest_m = std::max(longest_m, end.at_m);
+      bare_m += seen == Seen::kBare ? step_m : 0.0;
+      unseen_m += seen == Seen::kNothing ? step_m : 0.0;
+      *is_end = bare_m >= kBareRun_m;
+      if (*is_end || unseen_m >= kUnseenRun_m) {
+        break;
       }
     }
-    return {longest_m, sizes.length_sigma, false};
+    return last_m;
+  };
+  DividerExtent extent;
+  const double inside_m = 0.5 * sizes.min_length;
+  bool is_begin = false;
+  extent.begin_m = walk(inside_m, -kBefore_m, &is_begin) - 0.5 * step_m;
+  if (!is_begin) {
+    extent.begin_m = 0.0;
   }
-  const auto count = static_cast<double>(agreeing_m.size());
-  return {quantile(agreeing_m, 0.5), std::max(kSmallestSigma_m, kEndSigma_m / std::sqrt(count)), true};
+  extent.end_m = walk(inside_m, 2.0 * sizes.max_length, &extent.is_end_seen) + 0.5 * step_m;
+  extent.is_end_seen = extent.is_end_seen && extent.length_m() >= sizes.min_length;
+  extent.end_sigma_m = kSeenSigma_m;
+  if (!extent.is_end_seen) {
+    const double seen_m = extent.length_m() <= sizes.max_length ? extent.length_m() : 0.0;
+    extent.end_m = extent.begin_m + std::max(seen_m, sizes.usual_length);
+    extent.end_sigma_m = sizes.length_sigma;
+  }
+  return extent;
 }
 
 }  // namespace vcharge

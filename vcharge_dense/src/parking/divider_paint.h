@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "parking/bay_lattice.h"
@@ -23,14 +25,17 @@ DividerPaint paintAlong(const GroundImage& ground, const Eigen::Vector2d& entry_
 /// Contrast of the paler lines: distant ones and those in the shade.
 double paleContrast(const LatticeLines& lines);
 
-/// Length of the dividers of a row.
-struct DividerLength {
-  double length_m = 0.0, sigma_m = 0.0;
-  bool is_seen = false;  ///< otherwise a usual one
+/// Where the dividers of a row begin and end, in metres along them from the lattice's points at the lane.
+struct DividerExtent {
+  double begin_m = 0.0, end_m = 0.0;
+  double end_sigma_m = 0.0;
+  bool is_end_seen = false;  ///< otherwise the length is a usual one, or what is seen if it is longer
+
+  double length_m() const { return end_m - begin_m; }
 };
 
-/// The length on which the lines agree whose far ends are seen: bare ground or a kerb follows.
-DividerLength lengthOf(const GroundImage& ground, const BayLattice& lattice, const LatticeLines& lines,
-                       const BaySizes& sizes);
+/// Extent of the paint that most dividers of a row have in common: cars hide parts of each.
+DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, const std::vector<int>& numbers,
+                       double line_contrast, const BaySizes& sizes);
 
 }  // namespace vcharge
