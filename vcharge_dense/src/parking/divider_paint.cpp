@@ -103,7 +103,8 @@ DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, con
   const double inside_m = 0.5 * sizes.min_length;
   bool is_begin = false;
   extent.begin_m = walk(inside_m, -kBefore_m, &is_begin) - 0.5 * step_m;
-  if (!is_begin) {
+  // Lines begin at the lattice's points or before them; further in, cars hide too much.
+  if (!is_begin || extent.begin_m > kEntryTolerance_m) {
     extent.begin_m = 0.0;
   }
   extent.end_m = walk(inside_m, 2.0 * sizes.max_length, &extent.is_end_seen) + 0.5 * step_m;
