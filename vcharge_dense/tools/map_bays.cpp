@@ -14,12 +14,12 @@ namespace {
 using namespace vcharge;
 
 void mapBays(const std::string& height_map, const std::string& output, nlohmann::json* found) {
+  const HeightMap map = readHeightMap(height_map);
   ParkingBays bays;
   try {
-    bays = findBays(readHeightMap(height_map));
+    bays = findBays(map);
   } catch (const InputError& error) {
-    const std::string text = error.what();
-    throw InputError(text.rfind(height_map, 0) == 0 ? text : height_map + ": " + text);
+    throw InputError(height_map + ": " + error.what());
   }
   writeParkingBays(bays, output);
   const auto count = [&](BayState state) {

@@ -20,7 +20,7 @@ namespace {
 std::array<Eigen::Vector2d, 4> cornersOf(const BayRow& row, size_t index) {
   const Eigen::Vector2d near_m = row.entry_m + static_cast<double>(index) * row.step_m;
   const Eigen::Vector2d next_m = near_m + row.step_m;
-  const bool is_left = row.step_m.x() * row.depth_m.y() - row.step_m.y() * row.depth_m.x() > 0.0;
+  const bool is_left = rightOf(row.step_m).dot(row.depth_m) < 0.0;
   return is_left ? std::array<Eigen::Vector2d, 4>{near_m, next_m, next_m + row.depth_m, near_m + row.depth_m}
                  : std::array<Eigen::Vector2d, 4>{next_m, near_m, near_m + row.depth_m, next_m + row.depth_m};
 }
@@ -120,7 +120,6 @@ ParkingBays findBays(const HeightMap& map) {
   result.frame_id = map.frame_id;
   uint32_t row_number = 0;
   for (const BayRow& row : findBayRows(ground, findPaintLines(ground))) {
-    bool has_bay = false;
     for (size_t i = 0; i + 1 < row.dividers.size(); ++i) {
       ParkingBay bay;
       bay.id = static_cast<uint32_t>(result.bays.size() + 1);
@@ -130,12 +129,11 @@ ParkingBays findBays(const HeightMap& map) {
       bay.entry_sigma_m = row.entry_sigma_m;
       bay.end_sigma_m = row.end_sigma_m;
       const int num_seen = (row.dividers[i].is_seen ? 1 : 0) + (row.dividers[i + 1].is_seen ? 1 : 0);
-      bay.confidence = (0.5 + 0.25 * num_seen) * (row.dividers.size() > 2 ? 1.0 : 0.7);
+      bay.confidence = 0.5 + 0.25 * num_seen;
       bay.state = stateOf(map, ground, bay);
       result.bays.push_back(bay);
-      has_bay = true;
     }
-    row_number += has_bay ? 1 : 0;
+    ++row_number;
   }
   return result;
 }

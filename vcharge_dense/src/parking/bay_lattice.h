@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "parking/ground_image.h"
+
 namespace vcharge {
 
 /// Sizes of the bays of a kind, in metres, from parking regulations with margins.
@@ -69,10 +71,5 @@ bool isFilled(const BayLattice& lattice, const LatticeLines& lines, const std::v
 /// Fits a lattice to its lines by least squares. Dividers that are nearly at right angles to the lane remain
 /// so.
 BayLattice adjusted(const BayLattice& lattice, const LatticeLines& lines);
-
-/// The direction at right angles to another, to its right.
-inline Eigen::Vector2d rightOf(const Eigen::Vector2d& direction) {
-  return {direction.y(), -direction.x()};
-}
 
 }  // namespace vcharge

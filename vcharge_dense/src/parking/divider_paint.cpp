@@ -1,6 +1,7 @@
 #include "parking/divider_paint.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -9,13 +10,15 @@
 namespace vcharge {
 namespace {
 
+// Across a line, which is known to some centimetres only.
+constexpr std::array<double, 3> kOffsets_m{0.0, -0.05, 0.05};
 constexpr double kPaintRatio = 0.5, kBareRatio = 0.3;  // contrast over that of a line
 
-/// Paint at a place of a line that is known to some centimetres only. Nothing unless both sides are seen.
+/// Contrast of the paint at a place of a line. Nothing unless both sides are seen.
 std::optional<double> contrastNear(const GroundImage& ground, const Eigen::Vector2d& position_m,
                                    const Eigen::Vector2d& across) {
   std::optional<double> best;
-  for (const double offset_m : {-0.05, 0.0, 0.05}) {
+  for (const double offset_m : kOffsets_m) {
     const auto found = ground.lineContrast(position_m + offset_m * across, across);
     if (found && found->to_left && found->to_right) {
       best = std::max(best.value_or(found->smaller()), found->smaller());
@@ -34,8 +37,7 @@ DividerPaint paintAlong(const GroundImage& ground, const Eigen::Vector2d& entry_
   DividerPaint paint;
   for (double at_m = kMargin_m; at_m < length_m - kMargin_m; at_m += step_m) {
     bool is_painted = false, is_bare = false;
-    // The row is known to some centimetres only.
-    for (const double offset_m : {0.0, -0.05, 0.05}) {
+    for (const double offset_m : kOffsets_m) {
       if (const auto found = ground.lineContrast(entry_m + at_m * along + offset_m * across, across)) {
         is_painted |= found->smaller() >= kPaintRatio * line_contrast;
         is_bare |=
@@ -79,7 +81,7 @@ DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, con
     std::sort(contrasts.begin(), contrasts.end());
     return contrasts[(contrasts.size() - 1) / 2] >= least ? Seen::kPaint : Seen::kBare;
   };
-  // Goes on from a painted place until the ground is bare, or nothing is seen.
+  // The last painted place before the ground is bare, or nothing is seen; the start if none is painted.
   const auto walk = [&](double from_m, double to_m, bool* is_end) {
     const double direction = to_m > from_m ? 1.0 : -1.0;
     double last_m = from_m, bare_m = 0.0, unseen_m = 0.0;

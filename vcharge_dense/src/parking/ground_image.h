@@ -56,6 +56,11 @@ class GroundImage {
   cv::Mat height_m_, brightness_, is_ground_;
 };
 
+/// The direction at right angles to another, to its right.
+inline Eigen::Vector2d rightOf(const Eigen::Vector2d& direction) {
+  return {direction.y(), -direction.x()};
+}
+
 /// Distance of the middle of a line to the ground beside it that it is compared with. Lines are up to 0.2 m
 /// wide.
 inline constexpr double kBesideLine_m = 0.25;

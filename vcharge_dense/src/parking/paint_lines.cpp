@@ -145,7 +145,7 @@ std::vector<PaintLine> roughLines(const GroundImage& ground, double angle_rad) {
                                      static_cast<int>(std::lround(kGap_m / cell_m)))) {
     if ((chain.row - chain.first_row) * cell_m >= kMinLength_m) {
       lines.push_back({ground.positionOf(turned.cellOf(chain.first_column, chain.first_row)),
-                       ground.positionOf(turned.cellOf(chain.column, chain.row)), least, 0.0});
+                       ground.positionOf(turned.cellOf(chain.column, chain.row))});
     }
   }
   return lines;
@@ -188,95 +188,98 @@ std::optional<double> middleOfPaint(const GroundImage& ground, const Eigen::Vect
   return weight > 0.0 ? std::optional(sum / weight) : std::nullopt;
 }
 
-/// Fits the middle of a line and its ends to the paint. Nothing if there is no clear line.
-std::optional<PaintLine> fitted(const GroundImage& ground, PaintLine line) {
+/// Moves a line to the middle of its paint by linear regression. False if too little paint is seen.
+bool moveToMiddle(const GroundImage& ground, PaintLine* line) {
   constexpr double kReach_m = 0.15;
-  constexpr double kCorrelation_m = 0.15;  // over which errors of the middle are alike
-  constexpr double kSmallestSigma_m = 0.01;
-  const double step_m = ground.cellSize_m();
-  for (int round = 0; round < 3; ++round) {
-    const Eigen::Vector2d along = line.direction(), across(along.y(), -along.x());
-    std::vector<Eigen::Vector2d> middles;  // along and across
-    const int steps = static_cast<int>(line.length_m() / step_m);
-    for (int i = 0; i <= steps; ++i) {
-      if (const auto offset_m = middleOfPaint(ground, line.from_m + i * step_m * along, across, kReach_m)) {
-        middles.emplace_back(i * step_m, *offset_m);
-      }
+  const double step_m = ground.cellSize_m(), length_m = line->length_m();
+  const Eigen::Vector2d along = line->direction(), across = rightOf(along);
+  std::vector<Eigen::Vector2d> middles;  // along and across
+  const int steps = static_cast<int>(length_m / step_m);
+  for (int i = 0; i <= steps; ++i) {
+    if (const auto offset_m = middleOfPaint(ground, line->from_m + i * step_m * along, across, kReach_m)) {
+      middles.emplace_back(i * step_m, *offset_m);
     }
-    if (middles.size() * step_m < 0.5 * kMinLength_m) {
-      return std::nullopt;
-    }
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    for (const Eigen::Vector2d& middle : middles) {
-      mean += middle / static_cast<double>(middles.size());
-    }
-    double xx = 1e-9, xy = 0.0, yy = 0.0;
-    for (const Eigen::Vector2d& middle : middles) {
-      const Eigen::Vector2d d = middle - mean;
-      xx += d.x() * d.x();
-      xy += d.x() * d.y();
-      yy += d.y() * d.y();
-    }
-    const double slope = xy / xx;
-    const double independent = std::max(1.0, middles.size() * step_m / kCorrelation_m);
-    const double variance = std::max(0.0, yy - slope * xy) / static_cast<double>(middles.size());
-    line.sigma_m = std::max(kSmallestSigma_m, std::sqrt(variance / independent));
-    const Eigen::Vector2d origin_m = line.from_m;
-    const double length_m = line.length_m();
-    line.from_m = origin_m + (mean.y() - slope * mean.x()) * across;
-    line.to_m = origin_m + length_m * along + (mean.y() + slope * (length_m - mean.x())) * across;
   }
-  // The ends are where the contrast falls below a part of its median.
-  constexpr double kEndRatio = 0.45, kBeyond_m = 1.5, kEndGap_m = 0.3;
-  const Eigen::Vector2d along = line.direction(), across(along.y(), -along.x());
-  const int inside = static_cast<int>(line.length_m() / step_m),
+  if (middles.size() * step_m < 0.5 * kMinLength_m) {
+    return false;
+  }
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& middle : middles) {
+    mean += middle / static_cast<double>(middles.size());
+  }
+  double xx = 1e-9, xy = 0.0;
+  for (const Eigen::Vector2d& middle : middles) {
+    const Eigen::Vector2d d = middle - mean;
+    xx += d.x() * d.x();
+    xy += d.x() * d.y();
+  }
+  const double slope = xy / xx;
+  const Eigen::Vector2d origin_m = line->from_m;
+  line->from_m = origin_m + (mean.y() - slope * mean.x()) * across;
+  line->to_m = origin_m + length_m * along + (mean.y() + slope * (length_m - mean.x())) * across;
+  return true;
+}
+
+/// Takes the contrast of a line, and moves its ends to where it falls below a part of that. False if the line
+/// is pale or short.
+bool moveToEnds(const GroundImage& ground, PaintLine* line) {
+  constexpr double kEndRatio = 0.45, kBeyond_m = 1.5;
+  const double step_m = ground.cellSize_m();
+  const Eigen::Vector2d along = line->direction(), across = rightOf(along);
+  const int inside = static_cast<int>(line->length_m() / step_m),
             beyond = static_cast<int>(kBeyond_m / step_m);
   std::vector<std::optional<LineContrast>> contrasts;
   std::vector<double> known;
   for (int i = -beyond; i <= inside + beyond; ++i) {
-    contrasts.push_back(ground.lineContrast(line.from_m + i * step_m * along, across));
+    contrasts.push_back(ground.lineContrast(line->from_m + i * step_m * along, across));
     if (i >= 0 && i <= inside && contrasts.back()) {
       known.push_back(contrasts.back()->smaller());
     }
   }
   if (known.size() * step_m < 0.5 * kMinLength_m) {
-    return std::nullopt;
+    return false;
   }
-  line.contrast = quantile(known, 0.5);
-  if (line.contrast < kMinContrast) {
-    return std::nullopt;
+  line->contrast = quantile(known, 0.5);
+  if (line->contrast < kMinContrast) {
+    return false;
   }
   const auto end = [&](int direction) {
     int last = beyond + inside / 2;
-    const int gap = static_cast<int>(kEndGap_m / step_m);
+    const int gap = static_cast<int>(kGap_m / step_m);
     for (int i = last; i >= 0 && i < static_cast<int>(contrasts.size()) && std::abs(i - last) <= gap;
          i += direction) {
       const auto& contrast = contrasts[static_cast<size_t>(i)];
-      if (contrast && contrast->smaller() >= kEndRatio * line.contrast) {
+      if (contrast && contrast->smaller() >= kEndRatio * line->contrast) {
         last = i;
       }
     }
     return last - beyond;
   };
   const int first = end(-1), last = end(1);
-  const Eigen::Vector2d from_m = line.from_m;
-  line.from_m = from_m + (first - 0.5) * step_m * along;
-  line.to_m = from_m + (last + 0.5) * step_m * along;
-  return line.length_m() >= kMinLength_m ? std::optional(line) : std::nullopt;
+  const Eigen::Vector2d from_m = line->from_m;
+  line->from_m = from_m + (first - 0.5) * step_m * along;
+  line->to_m = from_m + (last + 0.5) * step_m * along;
+  return line->length_m() >= kMinLength_m;
 }
 
-/// Whether most of a line lies on another.
-bool isPartOf(const PaintLine& line, const PaintLine& other) {
-  const Eigen::Vector2d along = other.direction(), across(along.y(), -along.x());
-  if (std::abs(along.dot(line.direction())) < std::cos(kSameLine_rad)) {
-    return false;
+/// Fits the middle of a line and its ends to the paint. False if there is no clear line.
+bool fit(const GroundImage& ground, PaintLine* line) {
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    if (!moveToMiddle(ground, line)) {
+      return false;
+    }
   }
-  const auto isOn = [&](const Eigen::Vector2d& position_m) {
-    const Eigen::Vector2d from = position_m - other.from_m;
-    return std::abs(across.dot(from)) < kSameLine_m && along.dot(from) > -kSameLine_m &&
-           along.dot(from) < other.length_m() + kSameLine_m;
-  };
-  return isOn(0.5 * (line.from_m + line.to_m));
+  return moveToEnds(ground, line);
+}
+
+/// Whether the middle of a line lies on another of the same direction.
+bool isPartOf(const PaintLine& line, const PaintLine& other) {
+  const Eigen::Vector2d along = other.direction();
+  const Eigen::Vector2d from = 0.5 * (line.from_m + line.to_m) - other.from_m;
+  return std::abs(along.dot(line.direction())) >= std::cos(kSameLine_rad) &&
+         std::abs(rightOf(along).dot(from)) < kSameLine_m && along.dot(from) > -kSameLine_m &&
+         along.dot(from) < other.length_m() + kSameLine_m;
 }
 
 }  // namespace
@@ -285,9 +288,9 @@ std::vector<PaintLine> findPaintLines(const GroundImage& ground) {
   std::vector<std::vector<PaintLine>> of_direction(kNumDirections);
   tbb::parallel_for(0, kNumDirections, [&](int i) {
     std::vector<PaintLine>& lines = of_direction[static_cast<size_t>(i)];
-    for (const PaintLine& rough : roughLines(ground, i * kPi / kNumDirections)) {
-      if (const auto line = fitted(ground, rough)) {
-        lines.push_back(*line);
+    for (PaintLine& line : roughLines(ground, i * kPi / kNumDirections)) {
+      if (fit(ground, &line)) {
+        lines.push_back(line);
       }
     }
   });

@@ -12,7 +12,6 @@ namespace vcharge {
 struct PaintLine {
   Eigen::Vector2d from_m, to_m;  ///< ends of its middle
   double contrast = 0.0;         ///< of the logarithm of the brightness
-  double sigma_m = 0.0;          ///< standard deviation of its middle across
 
   double length_m() const { return (to_m - from_m).norm(); }
   Eigen::Vector2d direction() const { return (to_m - from_m).normalized(); }

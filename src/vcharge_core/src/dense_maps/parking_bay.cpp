@@ -1,32 +1,6 @@
 #include "vcharge_core/dense_maps/parking_bay.h"
 
-#include "vcharge_core/base/error.h"
-
 namespace vcharge {
-
-const char* nameOf(BayKind kind) {
-  switch (kind) {
-    case BayKind::kPerpendicular:
-      return "perpendicular";
-    case BayKind::kAngled:
-      return "angled";
-    case BayKind::kParallel:
-      return "parallel";
-  }
-  throw std::logic_error("nameOf: not a kind of bay");
-}
-
-const char* nameOf(BayState state) {
-  switch (state) {
-    case BayState::kFree:
-      return "free";
-    case BayState::kOccupied:
-      return "occupied";
-    case BayState::kUnknown:
-      return "unknown";
-  }
-  throw std::logic_error("nameOf: not a state of a bay");
-}
 
 void addToHash(const ParkingBays& bays, ContentHasher* hasher) {
   hasher->add(bays.frame_id);

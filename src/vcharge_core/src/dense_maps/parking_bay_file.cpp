@@ -3,6 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <yaml-cpp/yaml.h>
 
@@ -11,14 +14,30 @@
 #include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
+
+template <>
+inline std::vector<std::string> enumNames<BayKind>() {
+  return {"perpendicular", "angled", "parallel"};
+}
+template <>
+inline std::vector<std::string> enumNames<BayState>() {
+  return {"free", "occupied", "unknown"};
+}
+
 namespace {
+
+template <class Enum>
+std::string nameOf(Enum value) {
+  return enumNames<Enum>().at(static_cast<size_t>(value));
+}
 
 /// Reads the values of one bay; errors name the file and the bay.
 class BayReader {
  public:
-  BayReader(const YAML::Node& node, std::string name) : node_(node), name_(std::move(name)) {
+  BayReader(const YAML::Node& node, std::string path, std::string bay)
+      : node_(node), path_(std::move(path)), bay_(std::move(bay)) {
     if (!node.IsMap()) {
-      throw InputError(name_ + ": expected a bay (id, row, kind, state, corners_m, ...)");
+      throw InputError(path_ + ": " + bay_ + ": expected a bay (id, row, kind, state, corners_m, ...)");
     }
   }
 
@@ -27,45 +46,42 @@ class BayReader {
     try {
       return node_[key].as<T>();
     } catch (const YAML::Exception&) {
-      throw InputError(name_ + "." + key + ": expected " + expected);
+      fail(key, expected);
     }
   }
 
   double number(const char* key, double high, const char* expected) const {
     const auto found = value<double>(key, expected);
     if (!(found >= 0.0 && found <= high)) {
-      throw InputError(name_ + "." + key + ": expected " + expected);
+      fail(key, expected);
     }
     return found;
   }
 
-  template <class Enum, size_t size>
-  Enum choice(const char* key, const std::array<Enum, size>& choices) const {
-    const auto text = value<std::string>(key, "a word");
-    std::string names;
-    for (const Enum one : choices) {
-      if (text == nameOf(one)) {
-        return one;
-      }
-      names += (names.empty() ? "" : ", ") + std::string(nameOf(one));
-    }
-    throw InputError(name_ + "." + key + ": expected one of " + names + ", got '" + text + "'");
+  template <class Enum>
+  Enum choice(const char* key) const {
+    value<std::string>(key, "a word");  // the key may be missing
+    return static_cast<Enum>(internal::readEnum(node_[key], path_, bay_ + "." + key, enumNames<Enum>()));
+  }
+
+  [[noreturn]] void fail(const char* key, const char* expected) const {
+    throw InputError(path_ + ": " + bay_ + "." + key + ": expected " + expected);
   }
 
  private:
   const YAML::Node& node_;
-  const std::string name_;
+  const std::string path_, bay_;
 };
 
-ParkingBay readBay(const YAML::Node& node, const std::string& name) {
+ParkingBay readBay(const YAML::Node& node, const std::string& path, const std::string& name) {
   constexpr const char* kCorners = "four corners [x, y], finite, in metres";
   constexpr double kLargest = 1e6;
-  const BayReader reader(node, name);
+  const BayReader reader(node, path, name);
   ParkingBay bay;
   bay.id = reader.value<uint32_t>("id", "a number from 0");
   bay.row = reader.value<uint32_t>("row", "a number from 0");
-  bay.kind = reader.choice("kind", std::array{BayKind::kPerpendicular, BayKind::kAngled, BayKind::kParallel});
-  bay.state = reader.choice("state", std::array{BayState::kFree, BayState::kOccupied, BayState::kUnknown});
+  bay.kind = reader.choice<BayKind>("kind");
+  bay.state = reader.choice<BayState>("state");
   const auto corners = reader.value<std::vector<std::vector<double>>>("corners_m", kCorners);
   bool is_right = corners.size() == bay.corners_m.size();
   for (size_t i = 0; is_right && i < corners.size(); ++i) {
@@ -75,7 +91,7 @@ ParkingBay readBay(const YAML::Node& node, const std::string& name) {
     }
   }
   if (!is_right) {
-    throw InputError(name + ".corners_m: expected " + kCorners);
+    reader.fail("corners_m", kCorners);
   }
   bay.entry_sigma_m = reader.number("entry_sigma_m", kLargest, "a number of metres from 0");
   bay.end_sigma_m = reader.number("end_sigma_m", kLargest, "a number of metres from 0");
@@ -98,9 +114,9 @@ void writeParkingBays(const ParkingBays& bays, const std::string& path) {
     std::snprintf(line.data(), line.size(),
                   "  - {id: %u, row: %u, kind: %s, state: %s, corners_m: [[%.9g, %.9g], [%.9g, %.9g], "
                   "[%.9g, %.9g], [%.9g, %.9g]], entry_sigma_m: %.4g, end_sigma_m: %.4g, confidence: %.3g}\n",
-                  bay.id, bay.row, nameOf(bay.kind), nameOf(bay.state), c[0].x(), c[0].y(), c[1].x(),
-                  c[1].y(), c[2].x(), c[2].y(), c[3].x(), c[3].y(), bay.entry_sigma_m, bay.end_sigma_m,
-                  bay.confidence);
+                  bay.id, bay.row, nameOf(bay.kind).c_str(), nameOf(bay.state).c_str(), c[0].x(), c[0].y(),
+                  c[1].x(), c[1].y(), c[2].x(), c[2].y(), c[3].x(), c[3].y(), bay.entry_sigma_m,
+                  bay.end_sigma_m, bay.confidence);
     text += line.data();
   }
   writeTextFileAtomically(path, text);
@@ -115,7 +131,7 @@ ParkingBays readParkingBays(const std::string& path) {
   ParkingBays bays;
   bays.frame_id = node["frame"].as<std::string>();
   for (size_t i = 0; i < node["bays"].size(); ++i) {
-    bays.bays.push_back(readBay(node["bays"][i], path + ": bays[" + std::to_string(i) + "]"));
+    bays.bays.push_back(readBay(node["bays"][i], path, "bays[" + std::to_string(i) + "]"));
   }
   return bays;
 }

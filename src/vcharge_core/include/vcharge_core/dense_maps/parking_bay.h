@@ -14,13 +14,8 @@ namespace vcharge {
 /// How bays lie at their lane.
 enum class BayKind : uint8_t { kPerpendicular, kAngled, kParallel };
 
-/// Whether a car fits into a bay. Unknown: too little of the bay was observed.
+/// Whether something stands in a bay. Unknown: too little of the bay was observed.
 enum class BayState : uint8_t { kFree, kOccupied, kUnknown };
-
-/// Names in files and reports: "perpendicular", "angled", "parallel".
-const char* nameOf(BayKind kind);
-/// Names in files and reports: "free", "occupied", "unknown".
-const char* nameOf(BayState state);
 
 /// A marked parking bay, between the middles of its lines.
 struct ParkingBay {
