@@ -30,10 +30,18 @@ namespace {
 using namespace vcharge;
 
 struct Arguments {
-  std::string bag, rig, options, range_options, object_options, range, output;
+  std::string bag, rig, vehicle, options, range_options, object_options, range, output;
   std::vector<std::string> cameras;
   bool show_options = false, no_objects = false;
 };
+
+/// Overrides options by those of a file, if one is given.
+template <class Options>
+void readIfGiven(const std::string& path, Options* options) {
+  if (!path.empty()) {
+    readFieldsFromFile(path, options);
+  }
+}
 
 /// Processor time of all threads of the process during parts of a run.
 class ProcessorTime {
@@ -331,6 +339,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   app.addOption("--bag", &arguments.bag, "the drive").required();
   app.addOption("--rig", &arguments.rig, "rig.yaml with vehicle_from_camera").required();
+  app.addOption("--vehicle", &arguments.vehicle, "YAML with the size of the vehicle (default: a Golf)");
   app.addOption("--options", &arguments.options, "YAML with overrides of ObstacleMapperOptions");
   app.addOption("--range-options", &arguments.range_options, "YAML with overrides of RangeMapperOptions");
   app.addOption("--object-options", &arguments.object_options, "YAML with overrides of ObjectTrackerOptions");
@@ -351,15 +360,10 @@ int main(int argc, char** argv) {
     ObstacleMapperOptions options;
     RangeMapperOptions range_options;
     ObjectTrackerOptions object_options;
-    if (!arguments.options.empty()) {
-      readFieldsFromFile(arguments.options, &options);
-    }
-    if (!arguments.range_options.empty()) {
-      readFieldsFromFile(arguments.range_options, &range_options);
-    }
-    if (!arguments.object_options.empty()) {
-      readFieldsFromFile(arguments.object_options, &object_options);
-    }
+    readIfGiven(arguments.vehicle, &options);
+    readIfGiven(arguments.options, &options);
+    readIfGiven(arguments.range_options, &range_options);
+    readIfGiven(arguments.object_options, &object_options);
     if (!arguments.cameras.empty()) {
       options.cameras = object_options.cameras = arguments.cameras;
     }

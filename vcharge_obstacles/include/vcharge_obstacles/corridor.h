@@ -11,7 +11,7 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/dense_maps/obstacle_map.h"
 #include "vcharge_core/motion/tracked_object.h"
-#include "vcharge_obstacles/vehicle_outline.h"
+#include "vcharge_core/motion/vehicle_footprint.h"
 
 namespace vcharge {
 

@@ -10,9 +10,9 @@
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/dense_maps/obstacle_map.h"
 #include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_core/motion/vehicle_footprint.h"
 #include "vcharge_obstacles/ground_plane.h"
 #include "vcharge_obstacles/polar_grid.h"
-#include "vcharge_obstacles/vehicle_outline.h"
 
 namespace vcharge {
 
@@ -34,16 +34,7 @@ struct ObstacleDetectorOptions {
                  "Points that make an obstacle, as a fraction of those of one 0.2 m high.");
   VCHARGE_OPTION(double, max_off_axis_rad, 1.1, positive(),
                  "Horizontal angle from the optical axis beyond which distant points mark no obstacle.");
-  VCHARGE_OPTION(double, vehicle_front_m, 3.75, anyValue(), "Front end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_rear_m, -0.95, anyValue(), "Rear end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_half_width_m, 0.95, positive(), "Half the width of the vehicle.");
   VCHARGE_END_OPTIONS();
-
-  void checkFields() const {
-    requireField(vehicle_front_m > vehicle_rear_m, "vehicle_front_m", "must be above vehicle_rear_m",
-                 vehicle_front_m);
-  }
-  VehicleOutline vehicleOutline() const { return {vehicle_front_m, vehicle_rear_m, vehicle_half_width_m}; }
 };
 
 /// An obstacle on the ground, or hanging low above it, in one sector of a camera.
@@ -102,8 +93,10 @@ class ObstacleDetector {
   /// as ground there.
   static constexpr double kMaxOffAxisFree_m = 1.5;
 
-  /// std::invalid_argument for bad options, or a camera that is not above the reference height.
+  /// Points inside the vehicle's outline are not used. std::invalid_argument for bad options, or a camera
+  /// that is not above the reference height.
   ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
+                   const VehicleOutline& vehicle,
                    const ObstacleDetectorOptions& options = ObstacleDetectorOptions());
 
   /// std::logic_error for a range map of another size than the camera's.

@@ -10,6 +10,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_core/frames/frame_assembler.h"
+#include "vcharge_core/motion/vehicle_footprint.h"
 #include "vcharge_obstacles/corridor.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
@@ -37,6 +38,7 @@ struct ObstacleMapperOptions {
                  "Cameras of the rig by name; empty: all.");
   VCHARGE_OPTION(FixedFrame, fixed_frame, FixedFrame::kOdom, anyValue(),
                  "Frame in which the cells are fixed.");
+  VCHARGE_OPTION_GROUP(VehicleFootprint, vehicle, {}, "The ground that the vehicle covers.");
   VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
   VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
   VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");

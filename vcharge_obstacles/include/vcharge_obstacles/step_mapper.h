@@ -8,8 +8,8 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/dense_maps/step_map.h"
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/vehicle_footprint.h"
 #include "vcharge_obstacles/scrolling_grid.h"
-#include "vcharge_obstacles/vehicle_outline.h"
 
 namespace vcharge {
 

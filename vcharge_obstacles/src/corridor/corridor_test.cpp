@@ -49,7 +49,7 @@ class CorridorTest : public ::testing::Test {
 };
 
 TEST_F(CorridorTest, OutlineIsTheDetectors) {
-  const VehicleOutline outline = ObstacleDetectorOptions().vehicleOutline();
+  const VehicleOutline outline = VehicleFootprint().outline();
   EXPECT_EQ(outline.front_m, vehicle_.front_m);
   EXPECT_EQ(outline.rear_m, vehicle_.rear_m);
   EXPECT_EQ(outline.half_width_m, vehicle_.half_width_m);

@@ -46,8 +46,9 @@ struct GroundEvidence {
 
 struct ObstacleDetector::Implementation {
   Implementation(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
-                 const ObstacleDetectorOptions& detector_options)
+                 const VehicleOutline& outline, const ObstacleDetectorOptions& detector_options)
       : options(detector_options),
+        vehicle(outline),
         grid(options.grid),
         size(camera.size()),
         position(vehicle_from_camera.translation().cast<float>()),
@@ -71,8 +72,7 @@ struct ObstacleDetector::Implementation {
            sigma_m <= kMaxRelativeSigma * range_m;  // false for NaN
   }
   bool isOwnVehicle(float x_m, float y_m) const {
-    return x_m < options.vehicle_front_m && x_m > options.vehicle_rear_m &&
-           std::abs(y_m) < options.vehicle_half_width_m;
+    return x_m < vehicle.front_m && x_m > vehicle.rear_m && std::abs(y_m) < vehicle.half_width_m;
   }
   GroundCandidates collectGround(const RangeMap& map) const;
   PolarPoints collectPoints(const RangeMap& map, const GroundPlane& ground, GroundEvidence* evidence) const;
@@ -81,6 +81,7 @@ struct ObstacleDetector::Implementation {
   void dropOverhungGround(std::vector<float>* free_fraction) const;
 
   const ObstacleDetectorOptions options;
+  const VehicleOutline vehicle;
   const PolarGrid grid;
   const cv::Size size;
   const Eigen::Vector3f position;
@@ -92,7 +93,7 @@ struct ObstacleDetector::Implementation {
 };
 
 ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
-                                   const ObstacleDetectorOptions& options) {
+                                   const VehicleOutline& vehicle, const ObstacleDetectorOptions& options) {
   options.validate();
   const double height_m = vehicle_from_camera.translation().z();
   if (!(height_m > kReferenceHeight_m + 0.05)) {
@@ -100,7 +101,7 @@ ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTrans
         "vehicle_from_camera: expected a camera more than 0.25 m above the ground, is at " +
         std::to_string(height_m) + " m");
   }
-  implementation_ = std::make_shared<const Implementation>(camera, vehicle_from_camera, options);
+  implementation_ = std::make_shared<const Implementation>(camera, vehicle_from_camera, vehicle, options);
 }
 
 GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap& map) const {

@@ -26,7 +26,7 @@ class ObstacleDetectorTest : public ::testing::Test {
   }
   CameraObstacles detectIn(const RangeMap& map, const RigCamera& camera) const {
     return ObstacleDetector(rebuildWorkingCamera(map.camera, map.range_m.size(), camera),
-                            *camera.vehicle_from_camera, options_)
+                            *camera.vehicle_from_camera, VehicleFootprint().outline(), options_)
         .detect(map);
   }
   /// Index of the scan's ray in a direction from the camera.

@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/camera/camera_rig.h"
-#include "vcharge_obstacles/vehicle_outline.h"
+#include "vcharge_core/motion/vehicle_footprint.h"
 
 namespace vcharge {
 

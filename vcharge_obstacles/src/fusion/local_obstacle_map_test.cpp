@@ -19,7 +19,7 @@ class LocalObstacleMapTest : public ::testing::Test {
     for (const RigCamera& camera : rig_.cameras) {
       const RangeMap map = measureBoxWorld({}, camera, {}, Timestamp());
       detectors_.emplace_back(rebuildWorkingCamera(map.camera, map.range_m.size(), camera),
-                              *camera.vehicle_from_camera, detector_options_);
+                              *camera.vehicle_from_camera, VehicleFootprint().outline(), detector_options_);
     }
   }
 

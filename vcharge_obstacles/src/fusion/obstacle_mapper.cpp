@@ -53,8 +53,8 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
       on_frame_(std::move(on_frame)),
       grid_(options.detector.grid),
       map_(options.map),
-      steps_(options.detector.vehicleOutline(), options.steps),
-      corridor_finder_(options.detector.vehicleOutline(), options.corridor),
+      steps_(options.vehicle.outline(), options.steps),
+      corridor_finder_(options.vehicle.outline(), options.corridor),
       curvature_(std::make_unique<PathCurvature>()) {
   cameras_.resize(rig_->cameras.size());
   std::vector<std::string> names = options_.cameras;
@@ -80,7 +80,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
   assembler_ = std::make_unique<FrameAssembler<Observation>>(
       cameras_.size(), options_.frames, [this](Frame frame) { process(std::move(frame)); },
       [this](DriveBreak drive_break, Timestamp stamp) { startOver(drive_break, stamp); }, is_used);
-  hidden_ = std::make_unique<const HiddenGround>(*rig_, is_used, options_.detector.vehicleOutline());
+  hidden_ = std::make_unique<const HiddenGround>(*rig_, is_used, options_.vehicle.outline());
   silent_ = std::make_unique<SilentCameras>(rig_, is_used, options_.map.free_range_m);
   standing_ = std::make_unique<StandingWatch>(rig_, grid_, options_.map.free_range_m, options_.watch);
   // Range maps take long to compute: a replay must give the same map however long that is.
@@ -93,7 +93,7 @@ ObstacleMapper::~ObstacleMapper() = default;
 void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
   num_jumps_ += drive_break == DriveBreak::kReplay ? 0 : 1;
   map_ = LocalObstacleMap(options_.map);
-  steps_ = StepMapper(options_.detector.vehicleOutline(), options_.steps);
+  steps_ = StepMapper(options_.vehicle.outline(), options_.steps);
   curvature_->clear();
   standing_->clear();
   objects_.clear();
@@ -189,12 +189,12 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
   if (!camera->detector || camera->size != map.range_m.size() ||
       camera->parameters != map.camera.parameters()) {
     const WorkingCamera working = rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
-    camera->detector =
-        std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera, options_.detector);
+    camera->detector = std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera,
+                                                          options_.vehicle.outline(), options_.detector);
     camera->watch = std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_,
                                                   options_.map.free_range_m, options_.watch);
     camera->heights = std::make_unique<NearHeights>(working, *rig_camera.vehicle_from_camera,
-                                                    options_.detector.vehicleOutline(), StepMapper::kReach_m);
+                                                    options_.vehicle.outline(), StepMapper::kReach_m);
     standing_->setCamera(camera->index, working);
     camera->size = map.range_m.size();
     camera->parameters = map.camera.parameters();

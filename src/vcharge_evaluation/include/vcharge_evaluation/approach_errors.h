@@ -22,12 +22,6 @@ struct ApproachEvaluationOptions {
   VCHARGE_OPTION(double, min_height_m, 0.2, positive(), "Least height of a judged obstacle.");
   VCHARGE_OPTION(double, max_gap_m, 1.0, notNegative(),
                  "Largest distance of a judged obstacle from the ground that is driven over.");
-  VCHARGE_OPTION(double, vehicle_front_m, kVehicleFront_m, anyValue(),
-                 "Front end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_rear_m, kVehicleRear_m, anyValue(),
-                 "Rear end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_half_width_m, kVehicleHalfWidth_m, positive(),
-                 "Half the width of the vehicle.");
   VCHARGE_END_OPTIONS();
 };
 

@@ -24,12 +24,6 @@ struct ObjectEvaluationOptions {
                  "Least part of the pixels of one camera that show a visible object: 30 of 640x400.");
   VCHARGE_OPTION(double, gate_m, 1.0, positive(),
                  "Largest position error of a report of an object, and the error of a missed one.");
-  VCHARGE_OPTION(double, vehicle_front_m, kVehicleFront_m, anyValue(),
-                 "Front end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_rear_m, kVehicleRear_m, anyValue(),
-                 "Rear end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_half_width_m, kVehicleHalfWidth_m, positive(),
-                 "Half the width of the vehicle.");
   VCHARGE_END_OPTIONS();
 };
 

@@ -123,8 +123,7 @@ double ObjectErrors::false_per_minute() const {
 
 ObjectEvaluator::ObjectEvaluator(const ObjectEvaluationOptions& options)
     : options_((options.validate(), options)),
-      vehicle_(vehicleOutline(RigidTransform(), options.vehicle_front_m, options.vehicle_rear_m,
-                              options.vehicle_half_width_m)) {}
+      vehicle_(vehicleOutline(RigidTransform(), kVehicleFront_m, kVehicleRear_m, kVehicleHalfWidth_m)) {}
 
 ObjectEvaluator::~ObjectEvaluator() = default;
 

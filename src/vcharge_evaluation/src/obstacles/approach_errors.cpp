@@ -77,8 +77,7 @@ ApproachEvaluator::ApproachEvaluator(const std::vector<TruthObstacle>& obstacles
 
 std::vector<Eigen::Vector2d> ApproachEvaluator::outline(const RigidTransform& world_from_vehicle,
                                                         double margin_m) const {
-  return vehicleOutline(world_from_vehicle, options_.vehicle_front_m, options_.vehicle_rear_m,
-                        options_.vehicle_half_width_m + margin_m);
+  return vehicleOutline(world_from_vehicle, kVehicleFront_m, kVehicleRear_m, kVehicleHalfWidth_m + margin_m);
 }
 
 void ApproachEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoint>& points,
@@ -174,7 +173,7 @@ ApproachEvaluator::Corridor ApproachEvaluator::corridorFrom(Timestamp stamp, boo
 }
 
 void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<TruthObstacle>& movers) {
-  const double reach_m = options_.corridor_m + options_.vehicle_front_m - options_.vehicle_rear_m;
+  const double reach_m = options_.corridor_m + kVehicleFront_m - kVehicleRear_m;
   const Eigen::Vector2d here_m = frame.level.translation().head<2>();
   const auto countCells = [&](const Corridor& corridor, double from_m, double to_m, const auto& add) {
     frame.forEachCell([&](int column, int row, int8_t state) {
