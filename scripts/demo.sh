@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 case " $* " in *" -h "* | *" --help "*)
   sed -n '2,10s/^# \{0,1\}//p' "$0"
-  PYTHONPATH=src/vcharge_evaluation/python exec /usr/bin/python3 -m vcharge_evaluation.chain.steps --help ;;
+  PYTHONPATH=src/vcharge_evaluation/python:src/vcharge_python/python exec /usr/bin/python3 -m vcharge_evaluation.chain.steps --help ;;
 esac
 
 scripts/install_dependencies.sh

@@ -8,5 +8,5 @@ command=("$@")
 set --  # a sourced script would read the arguments
 # shellcheck disable=SC1091
 set +u && . build/devel/setup.bash && set -u
-export PYTHONPATH=$PWD/src/vcharge_evaluation/python:${PYTHONPATH:-}
+export PYTHONPATH=$PWD/src/vcharge_evaluation/python:$PWD/src/vcharge_python/python:${PYTHONPATH:-}
 exec "${command[@]}"

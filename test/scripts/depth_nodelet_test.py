@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import rospy
 import rostest
+import vcharge
 import yaml
 from sensor_msgs.msg import Image, PointCloud2
 from vcharge_msgs.msg import ScheduledCameras
@@ -109,13 +110,13 @@ class DepthNodeletTest(unittest.TestCase):
             wait_for(lambda c=camera, n=len(stamps): self.count(c) >= n, f"the range maps of {camera}")
             self.assertEqual(sorted(self.received[camera, "image"]), stamps)
             for stamp in stamps:
-                images = {}
-                for kind, part in (("image", "range"), ("confidence", "confidence"), ("standard_deviation", "sigma")):
+                images, offline = {}, vcharge.read_range_map(self.offline, camera, stamp)
+                for kind, part, stored in (("image", "range", offline.range_m), ("confidence", "confidence", offline.confidence),
+                                           ("standard_deviation", "sigma", offline.standard_deviation_m)):
                     message = self.received[camera, kind][stamp]
                     self.assertEqual((message.encoding, message.header.frame_id),
                                      ("32FC1", f"camera_{camera}_optical"))
                     images[part] = np.frombuffer(message.data, np.float32).reshape(message.height, message.width)
-                    stored = cv2.imread(str(self.offline / camera / f"{stamp}_{part}.tiff"), cv2.IMREAD_UNCHANGED)
                     np.testing.assert_array_equal(images[part], stored)
                 errors.append(self.relative_errors(camera, stamp, rig[camera]["intrinsics"], images))
         errors = np.concatenate(errors)

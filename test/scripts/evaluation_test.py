@@ -26,10 +26,10 @@ from sensor_msgs.msg import Image
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
+import vcharge  # noqa: E402
 from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
 from vcharge_evaluation import bays, consistency, drives, graphs, obstacles, pose_graphs, poses, results  # noqa: E402
 from vcharge_evaluation import spoiled_drives, tools  # noqa: E402
-from vcharge_evaluation.camera_models import project  # noqa: E402
 from vcharge_evaluation.live import flame_graph, processes  # noqa: E402
 
 
@@ -170,11 +170,6 @@ class PosesTest(FolderTest):
         self.assertEqual(poses.stamp_ns("1700000000.123456789"), 1700000000123456789)
         self.assertEqual(poses.stamp_ns("5.1"), 5100000000)
 
-    def test_projection_of_the_axis_is_the_principal_point(self):
-        camera = {"model": "mei", "intrinsics": {"xi": 1.1, "gamma1": 800, "gamma2": 810, "u0": 640, "v0": 400, "k1": -0.3,
-                                                 "k2": 0.1, "p1": 0, "p2": 0}}
-        np.testing.assert_allclose(project([[0, 0, 2.0]], camera), [[640, 400]])
-
 
 class SpoiledDrivesTest(FolderTest):
     @staticmethod
@@ -292,8 +287,8 @@ class BaysTest(unittest.TestCase):
         for number, state in enumerate(states):
             left = first + 2.5 * number
             corners = [[left, 3.0], [left + 2.5, 3.0], [left + 2.5, 8.0], [left, 8.0]]
-            found.append(bays.Bay({"kind": "perpendicular", "state": state, "entry_sigma_m": 0.05, "end_sigma_m": 0.05,
-                                   "corners_m": [[x + shift_m, y] for x, y in corners]}))
+            found.append(bays.Bay(vcharge.ParkingBay(number, 0, "perpendicular", state, np.array(corners) + [shift_m, 0.0], 0.05, 0.05,
+                                                     1.0)))
         return found
 
     def figures_of(self, found, true, drive_y=0.0):

@@ -8,11 +8,10 @@ import sys
 import tempfile
 import unittest
 
-import cv2
 import numpy as np
 import rosbag
 import rostest
-import yaml
+import vcharge
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import counted_skips  # noqa: E402,F401
@@ -38,17 +37,15 @@ class HeightMapRealTest(unittest.TestCase):
             status, output, errors = run(words)
             if status != 0:
                 raise RuntimeError(f"{words[0]} failed: {output} {errors}")
-        heights = cv2.imread(str(saved / "height_map.tiff"), cv2.IMREAD_UNCHANGED)
-        grid = yaml.safe_load((saved / "height_map.yaml").read_text())
+        grid = vcharge.read_height_map(saved)
         with rosbag.Bag(str(bag)) as recording:
             poses = [message.pose.pose for _, message, _ in recording.read_messages(topics=["/odom"])]
         pose = poses[len(poses) // 2]
         yaw = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
-        rows, columns = np.nonzero(np.isfinite(heights))
-        x = grid["origin_m"][0] + grid["cell_size_m"] * columns - pose.position.x
-        y = grid["origin_m"][1] + grid["cell_size_m"] * rows - pose.position.y
+        known = np.isfinite(grid.height_m)
+        x, y = (grid.centres_m()[known] - [pose.position.x, pose.position.y]).T
         cls.ahead, cls.left = math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x
-        cls.height = heights[rows, columns].astype(float)
+        cls.height = grid.height_m[known].astype(float)
         a = cls.plane_terms(cls.inside(COBBLES))
         cls.plane = np.linalg.lstsq(a, cls.height[cls.inside(COBBLES)], rcond=None)[0]
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import rospy
 import rostest
+import vcharge
 import yaml
 from nav_msgs.msg import OccupancyGrid
 from octomap_msgs.msg import Octomap
@@ -180,10 +181,8 @@ class HeightMapTest(unittest.TestCase):
         try:
             wait_for(lambda: len(received) == len(topics), "all topics of a height map")
             heights = np.array(received["/dense/height_map"].height_m)
-            size = yaml.safe_load((self.saved / "height_map.yaml").read_text())["size_cells"]
-            self.assertEqual(heights.size, size[0] * size[1])
-            drivable = cv2.imread(str(self.saved / "drivable.pgm"), cv2.IMREAD_UNCHANGED)[::-1]
-            states = np.select([drivable == 254, drivable == 0], [0, 100], -1)
+            self.assertEqual(heights.size, vcharge.read_height_map(self.saved).height_m.size)
+            states = vcharge.read_occupancy_grid(self.saved / "drivable.yaml").state
             np.testing.assert_array_equal(received["/dense/height_map/grid"].data, states.flatten())
             self.assertGreater(np.sum(states == 0), 1000)
             self.assertGreater(len(received["/dense/height_map/mesh"].points), 1000)

@@ -2,12 +2,13 @@
 import sqlite3
 
 import numpy as np
+import vcharge
 
 
 def positions(path):
     """Stamps (N) and positions (N x 3) of a TUM file."""
-    rows = np.loadtxt(path)
-    return rows[:, 0], rows[:, 1:4]
+    trajectory = vcharge.read_trajectory(path)
+    return trajectory.times_s, trajectory.positions_m
 
 
 def rigid_transform(points, targets):

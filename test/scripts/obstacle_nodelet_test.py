@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import rospy
 import rostest
+import vcharge
 import yaml
 from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -198,7 +199,7 @@ class ObstacleNodeletTest(unittest.TestCase):
 
     @classmethod
     def offline_stamps(cls):
-        return sorted(int(path.stem) for path in cls.offline.glob("*.yaml") if path.stem.isdigit())
+        return vcharge.list_obstacle_maps(cls.offline)
 
     def wait_for_message(self, *words):
         wait_for(lambda: self.diagnostics.tells(*words), f"a diagnostic with {words}")
@@ -224,9 +225,7 @@ class ObstacleNodeletTest(unittest.TestCase):
             if stamp not in grids or stamp not in scans:
                 continue
             compared += 1
-            pixels = cv2.imread(str(self.offline / f"{stamp}.pgm"), cv2.IMREAD_UNCHANGED)[::-1]
-            expected = np.select([pixels == 254, pixels == 0], [FREE, OCCUPIED], UNOBSERVED)
-            np.testing.assert_array_equal(cells_of(grids[stamp]), expected)
+            np.testing.assert_array_equal(cells_of(grids[stamp]), vcharge.read_obstacle_map(self.offline, stamp).state)
             self.compare_scan(scans[stamp], "fused", stamp)
         self.assertGreaterEqual(compared, len(stamps) - 3)
         for camera in CAMERAS:
@@ -237,23 +236,21 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.check_other_outputs()
 
     def compare_scan(self, scan, name, stamp):
-        with open(self.offline / f"{stamp}_scans.csv") as file:
-            expected = [float(row["range_m"]) for row in csv.DictReader(file) if row["name"] == name]
+        expected = vcharge.read_obstacle_scans(self.offline, stamp)[name].range_m
         ranges = [math.nan if math.isinf(value) else value for value in scan.ranges]
         np.testing.assert_allclose(ranges, expected, atol=2e-4)  # the file has four digits
 
     def check_against_truth(self, grid):
         """fixed_from_world: the odometry frame has its origin at the start of the drive."""
         world_from_odom = self.world_from_odom()
-        meta = yaml.safe_load((self.drive.truth / "height_map.yaml").read_text())
-        heights = cv2.imread(str(self.drive.truth / meta["file"]), cv2.IMREAD_UNCHANGED)
-        near = int(math.ceil(0.2 / meta["cell_size_m"]))
-        highest = cv2.dilate(heights, np.ones((2 * near + 1, 2 * near + 1)))
-        lowest = cv2.erode(heights, np.ones((2 * near + 1, 2 * near + 1)))
+        truth = vcharge.read_height_map(self.drive.truth)
+        near = int(math.ceil(0.2 / truth.cell_size_m))
+        highest = cv2.dilate(truth.height_m, np.ones((2 * near + 1, 2 * near + 1)))
+        lowest = cv2.erode(truth.height_m, np.ones((2 * near + 1, 2 * near + 1)))
 
         def at(image, positions):
             world = positions @ world_from_odom[:, :2].T + world_from_odom[:, 2]
-            cells = np.round((world - meta["origin_m"]) / meta["cell_size_m"]).astype(int)
+            cells = np.round((world - truth.origin_m) / truth.cell_size_m).astype(int)
             return image[cells[:, 1], cells[:, 0]]
 
         free, occupied = positions_of(grid, FREE), positions_of(grid, OCCUPIED)
@@ -264,7 +261,7 @@ class ObstacleNodeletTest(unittest.TestCase):
 
     def world_from_odom(self):
         """2 x 3 transform by the pose at the first image."""
-        truth = np.loadtxt(self.drive.truth / "trajectory.tum")[0]
+        truth = vcharge.read_trajectory(self.drive.truth / "trajectory.tum").rows[0]
         odometry = min((message for topic, message in self.messages if topic == "/odom"),
                        key=lambda message: abs(message.header.stamp.to_sec() - truth[0])).pose.pose
         yaw = 2 * math.atan2(truth[6], truth[7]) - 2 * math.atan2(odometry.orientation.z, odometry.orientation.w)

@@ -3,8 +3,8 @@ import argparse
 
 import cv2
 import numpy as np
-import yaml
 
+import vcharge
 from vcharge_evaluation.drives import CONDITIONS, LOOP_STEP, Drive
 from vcharge_evaluation.localization_errors import Map
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
@@ -26,10 +26,9 @@ def arguments():
 
 
 class Bay:
-    def __init__(self, entry, mapped=None):
-        self.kind, self.state = entry["kind"], entry["state"]
-        self.corners = np.array(entry["corners_m"])
-        self.sigmas = np.array([entry["entry_sigma_m"]] * 2 + [entry["end_sigma_m"]] * 2)
+    def __init__(self, bay, mapped=None):
+        self.kind, self.state, self.corners = bay.kind, bay.state, bay.corners_m
+        self.sigmas = np.array([bay.entry_sigma_m] * 2 + [bay.end_sigma_m] * 2)
         if mapped is not None:
             flat = np.column_stack([self.corners, np.full(4, mapped.positions[:, 2].mean())])
             self.corners = (flat @ mapped.turn.T + mapped.shift)[:, :2]
@@ -51,7 +50,7 @@ class Bay:
 
 
 def bays_of(path, mapped=None):
-    return [Bay(entry, mapped) for entry in yaml.safe_load(path.read_text(encoding="utf-8"))["bays"]]
+    return [Bay(bay, mapped) for bay in vcharge.read_bays(path).bays]
 
 
 def pairs_of(found, true):
@@ -103,7 +102,7 @@ def evaluate(args, scene, seed, condition):
     made = run_tool("map_bays", drive.folder / "bays.log", "--height-map", drive.folder / "height_map", "--output",
                     drive.folder / "bays.yaml")
     found = bays_of(drive.folder / "bays.yaml", Map(path, drive.trajectory))
-    return [*figures(found, bays_of(drive.truth / "bays.yaml"), np.loadtxt(drive.trajectory)[:, 1:3]),
+    return [*figures(found, bays_of(drive.truth / "bays.yaml"), vcharge.read_trajectory(drive.trajectory).positions_m[:, :2]),
             Figure("time", made.wall_s, "s")]
 
 

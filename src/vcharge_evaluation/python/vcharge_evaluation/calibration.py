@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 import yaml
 
+import vcharge
 from vcharge_evaluation import spoiled_drives
 from vcharge_evaluation.chain.figures import judge_rig as judge_and_draw_rig
 from vcharge_evaluation.drives import MAX_TIMED_RATIO, TIMINGS
 from vcharge_evaluation.live import rig_calibration as live_rig_calibration
-from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, import_published_images, judge_rig, run_tool, say, simulate
 
@@ -337,8 +337,8 @@ def evaluate_real(args, results):
         return
     given = folder / "rig.yaml"
     one = Calibration(folder, given, name="calibrated")
-    camera = next(iter(yaml.safe_load(given.read_text())["cameras"].values()))
-    camera_from_vehicle = rotations([camera["vehicle_from_camera"]["rotation_xyzw"]])[0].T
+    camera = next(iter(vcharge.read_rig(given)))
+    camera_from_vehicle = camera.vehicle_from_camera[:3, :3].T
     found = next(iter(one.run.found.get("cameras", [])), {})
     figures = [figure("verdict", one.verdict, equal="FAIL")]
     for name, axis, key, limit in (("direction of travel", 0, "travel_in_camera", 0.5),

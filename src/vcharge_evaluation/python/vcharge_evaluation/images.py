@@ -11,9 +11,8 @@ import pathlib
 import cv2
 import numpy as np
 import rosbag
-import yaml
 
-from vcharge_evaluation.camera_models import unproject
+import vcharge
 from vcharge_evaluation.poses import pose_of, transform
 from vcharge_evaluation.real_images import parking_lot_images, workshop_images
 from vcharge_evaluation.results import Results, add_arguments, figure
@@ -36,7 +35,7 @@ class ImageSet:
     name: str
     images: list
     masks: list  # one for all, or one per image
-    rig: dict = None
+    camera: vcharge.Camera = None
     vehicle_poses: list = None  # world_from_vehicle, 4 x 4
 
     def mask(self, index):
@@ -73,11 +72,10 @@ def read_drive(name, bag_path, rig_path, pose_topic):
                 poses[stamp] = transform(*pose_of(message))
             else:
                 images[stamp] = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
-    rig = yaml.safe_load(rig_path.read_text())["cameras"][CAMERA]
-    mask = cv2.imread(str(rig_path.parent / rig["mask"]), cv2.IMREAD_GRAYSCALE)
+    camera = vcharge.read_rig(rig_path)[CAMERA]
     times = np.array(sorted(poses))
     nearest = [poses[times[np.argmin(np.abs(times - stamp))]] for stamp in sorted(images)]
-    return ImageSet(name, [images[stamp] for stamp in sorted(images)], [mask], rig, nearest)
+    return ImageSet(name, [images[stamp] for stamp in sorted(images)], [camera.mask], camera, nearest)
 
 
 def statistics(images):
@@ -128,10 +126,8 @@ def right_matches(matches, images, pair):
     if not matches:
         return 0
     pixels = np.array(matches)
-    first, second = unproject(pixels[:, :2], images.rig), unproject(pixels[:, 2:], images.rig)
-    mounting = images.rig["vehicle_from_camera"]
-    vehicle_from_camera = transform(mounting["translation_m"], mounting["rotation_xyzw"])
-    world_from_camera = [images.vehicle_poses[k] @ vehicle_from_camera for k in pair]
+    first, second = images.camera.unproject(pixels[:, :2]), images.camera.unproject(pixels[:, 2:])
+    world_from_camera = [images.vehicle_poses[k] @ images.camera.vehicle_from_camera for k in pair]
     second_from_first = np.linalg.inv(world_from_camera[1]) @ world_from_camera[0]
     turned, baseline = first @ second_from_first[:3, :3].T, second_from_first[:3, 3]
     errors = []

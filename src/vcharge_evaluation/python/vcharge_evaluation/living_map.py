@@ -2,12 +2,12 @@
 of many kilometres."""
 import argparse
 import shutil
-import sqlite3
 
 import numpy as np
 import rosbag
 import rospy
 
+import vcharge
 from vcharge_evaluation.drives import Drive
 from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.poses import at_stamps
@@ -42,17 +42,15 @@ class LivingMap(Map):
         self.path = path
         trajectories = {recording_of(drive.folder / "map.vmap"): drive.trajectory for drive in drives}
         poses, truth = [], []
-        with sqlite3.connect(path) as database:
-            self.components = [row[0] for row in database.execute("SELECT component FROM session ORDER BY id")]
-            for session, recording in database.execute("SELECT id, recording_hash FROM session").fetchall():
-                rows = np.array(database.execute(
-                    "SELECT stamp_ns / 1e9, x_m, y_m, z_m, qx, qy, qz, qw FROM keyframe WHERE session = ? ORDER BY id",
-                    (session,)).fetchall())
-                # A map of one drive does not name it.
-                trajectory = trajectories[recording] if recording else drives[0].trajectory
-                poses.append(rows)
-                truth.append(at_stamps(trajectory, rows[:, 0]))
-            self.num_landmarks = database.execute("SELECT count(*) FROM landmark").fetchone()[0]
+        found = vcharge.read_map(path)
+        self.components = [session.component for session in found.sessions]
+        for number, session in enumerate(found.sessions):
+            rows = found.trajectory(number).rows
+            # A map of one drive does not name it.
+            trajectory = trajectories[session.recording_hash] if session.recording_hash else drives[0].trajectory
+            poses.append(rows)
+            truth.append(at_stamps(trajectory, rows[:, 0]))
+        self.num_landmarks = len(found.landmarks)
         self.fit(np.concatenate(poses), np.concatenate(truth))
 
     def figures(self):
@@ -66,8 +64,7 @@ class LivingMap(Map):
 
 def recording_of(map_path):
     """The hash of the recording that a map was built from."""
-    with sqlite3.connect(map_path) as database:
-        return database.execute("SELECT value FROM provenance WHERE key = 'bag_hash'").fetchone()[0]
+    return vcharge.read_map(map_path).provenance["bag_hash"]
 
 
 class Lot:

@@ -4,8 +4,8 @@ import csv
 import matplotlib
 import numpy as np
 
+import vcharge
 from vcharge_evaluation.poses import at_stamps, rotations
-from vcharge_evaluation.tools import run_tool
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
@@ -19,9 +19,7 @@ class Map:
 
     def __init__(self, path, true_trajectory):
         self.path = path
-        keyframes_path = path.parent / f"{path.stem}_keyframes.tum"
-        run_tool("map_info", path.parent / f"{path.stem}_info.log", "--map", path, "--trajectory", keyframes_path)
-        poses = np.loadtxt(keyframes_path)
+        poses = vcharge.read_map(path).trajectory().rows
         self.fit(poses, at_stamps(true_trajectory, poses[:, 0]))
 
     def fit(self, poses, truth):

@@ -5,6 +5,7 @@ import numpy as np
 import rosbag
 import rospy
 
+import vcharge
 from vcharge_evaluation.poses import pose_of, transform
 
 # From the end of one place to the start of the next, so far away, the car sees nothing: its images are black.
@@ -64,7 +65,7 @@ class Place:
         self.first, self.last = odometry_pose(odometry[0]), odometry_pose(odometry[-1])
         self.start_s = odometry[0].header.stamp.to_sec()
         self.duration_s = odometry[-1].header.stamp.to_sec() - self.start_s
-        self.truth = np.loadtxt(drive.trajectory)
+        self.truth = vcharge.read_trajectory(drive.trajectory).rows
 
     def with_levels(self, levels):
         """The same place with other gray levels; the messages are shared."""

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import yaml
 
+import vcharge
 from vcharge_evaluation import tools
 from vcharge_evaluation.drives import LOOP_STEP, Drive
 from vcharge_evaluation.long_drives import Place, gray_levels, join
@@ -150,7 +151,7 @@ def evaluate_real(args, results):
     tools.run([tools.tool_path("draw_landmarks"), "--map", folder / "real.vmap", "--bag", folder / "drive.bag", "--camera", "left",
                "--output", folder / "landmarks.png"], folder / "draw.log")
     errors = judge("trajectory", folder / "report", "--estimate", folder / "real.tum", "--truth", folder / "odometry.tum")
-    estimate = np.loadtxt(folder / "real.tum")
+    estimate = vcharge.read_trajectory(folder / "real.tum").rows
     given = at_stamps(folder / "odometry.tum", estimate[:, 0])
     lengths = [np.linalg.norm(np.diff(poses[:, 1:4], axis=0), axis=1).sum() for poses in (estimate, given)]
     rotation = math.degrees(errors["alignments"][1]["rotation_rad"]["max"])  # aligned at the first pose

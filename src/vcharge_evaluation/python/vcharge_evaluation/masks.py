@@ -3,10 +3,9 @@ import argparse
 
 import cv2
 import numpy as np
-import rosbag
 import yaml
 
-from vcharge_evaluation.camera_models import project
+import vcharge
 from vcharge_evaluation.drives import MASK_SCALE, MASK_SEEDS, FoundMasks, loop_drive
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import run_tool, simulate
@@ -38,20 +37,17 @@ def arguments():
 
 def field_of_view(camera):
     """True for the pixels inside the field of view."""
-    width, height = camera["image_size_px"]
-    angle, turn = 0.5 * camera["field_of_view_rad"], np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False)
+    width, height = camera.image_size_px
+    angle, turn = 0.5 * camera.field_of_view_rad, np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False)
     rim = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.full(turn.shape, np.cos(angle))], 1)
     inside = np.zeros((height, width), np.uint8)
-    cv2.fillPoly(inside, [np.rint(project(rim, camera)).astype(np.int32)], 1)
+    cv2.fillPoly(inside, [np.rint(camera.project(rim)).astype(np.int32)], 1)
     return inside > 0
 
 
-def hidden_pixels(folder, camera):
-    """True where a camera of a rig file in `folder` is masked."""
-    width, height = camera["image_size_px"]
-    if "mask" not in camera:
-        return np.zeros((height, width), bool)
-    return cv2.imread(str(folder / camera["mask"]), cv2.IMREAD_GRAYSCALE) == 0
+def hidden_pixels(camera):
+    """True where a camera is masked."""
+    return np.zeros(camera.image_size_px[::-1], bool) if camera.mask is None else camera.mask == 0
 
 
 class Pixels:
@@ -71,15 +67,15 @@ class Pixels:
         return percent(self.lost, self.scene)
 
 
-def compare(truth_folder, truth, found_folder, found):
+def compare(truth, found):
     """Pixels by camera name, inside the fields of view of both rigs. A missing rig or mask hides nothing."""
     pixels = {}
-    for name, camera in truth["cameras"].items():
-        inside, body, hidden = field_of_view(camera), hidden_pixels(truth_folder, camera), False
+    for camera in truth:
+        inside, body, hidden = field_of_view(camera), hidden_pixels(camera), False
         if found:
-            inside &= field_of_view(found["cameras"][name])
-            hidden = hidden_pixels(found_folder, found["cameras"][name])
-        pixels[name] = Pixels(*(int(np.count_nonzero(inside & part)) for part in
+            inside &= field_of_view(found[camera.name])
+            hidden = hidden_pixels(found[camera.name])
+        pixels[camera.name] = Pixels(*(int(np.count_nonzero(inside & part)) for part in
                                 (body, body & hidden, ~body, ~body & hidden)))
     return pixels
 
@@ -96,22 +92,20 @@ def make_masks(args, name):
     output = folder / "masked" / "cameras.yaml"
     result = run_tool("make_masks", folder / "make_masks.log", "--bag", folder / "drive.bag", "--rig",
                       folder / "cameras.yaml", "--output", output, "--report", folder / "report", may_fail=True)
-    found = None if result.error() else yaml.safe_load(output.read_text())
-    return result, compare(folder, truth, output.parent, found), folder
+    found = None if result.error() else vcharge.read_rig(output)
+    return result, compare(vcharge.read_rig(folder / "rig_truth.yaml"), found), folder
 
 
 def draw_worst(folder, output, pixels):
     """A camera's image with the found mask red and the outline of the true one yellow, for the camera that shows most of its body."""
     name = min(pixels, key=lambda one: pixels[one].hidden_percent() if pixels[one].body else 100.0)
-    truth = yaml.safe_load((folder / "rig_truth.yaml").read_text())["cameras"][name]
-    found = yaml.safe_load(output.read_text())["cameras"][name] if output.exists() else {**truth, "mask": None}
-    with rosbag.Bag(str(folder / "drive.bag")) as bag:
-        message = next(message for _, message, _ in bag.read_messages(topics=[f"/camera/{name}/image_raw"]))
-    picture = cv2.cvtColor(np.frombuffer(message.data, np.uint8).reshape(message.height, message.width), cv2.COLOR_GRAY2BGR)
-    if found.get("mask"):
-        hidden = hidden_pixels(output.parent, found)
+    truth = vcharge.read_rig(folder / "rig_truth.yaml")[name]
+    _, _, image = next(vcharge.read_images(folder / "drive.bag", [name]))
+    picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    if output.exists():
+        hidden = hidden_pixels(vcharge.read_rig(output)[name])
         picture[hidden] = (0.5 * picture[hidden] + 0.5 * np.array([0, 0, 255])).astype(np.uint8)
-    outlines, _ = cv2.findContours(hidden_pixels(folder, truth).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outlines, _ = cv2.findContours(hidden_pixels(truth).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(picture, outlines, -1, (0, 255, 255), 1)
     return picture, name
 
@@ -129,10 +123,8 @@ def evaluate_loop(args, loop, results):
     scene, seed = loop.split(":")
     drive = loop_drive(args.work, scene, int(seed), MASK_SCALE)
     masks = FoundMasks(drive)
-    truth = yaml.safe_load(drive.true_rig.read_text())
     output = drive.folder / "masked" / "cameras.yaml"
-    found = yaml.safe_load(masks.rig.read_text()) if masks.rig else None
-    pixels = compare(drive.folder, truth, output.parent, found)
+    pixels = compare(vcharge.read_rig(drive.true_rig), vcharge.read_rig(masks.rig) if masks.rig else None)
     results.add("Masks that the other stages use, from a loop of 24 s", (f"{scene}, seed {seed}", figures(masks.run, pixels)))
     show(results, drive.folder, output, pixels, f"{scene}, seed {seed}")
 

@@ -4,10 +4,9 @@ import argparse
 import math
 
 import numpy as np
-import yaml
 
+import vcharge
 from vcharge_evaluation.drives import Drive, condition_words
-from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, judge_rig, run_tool_once, say
 
@@ -66,7 +65,7 @@ def monitor(made, rig):
 
 def driven_until(made, time_s):
     """Distance driven until a time after the start of the drive."""
-    rows = np.loadtxt(made.trajectory)
+    rows = vcharge.read_trajectory(made.trajectory).rows
     rows = rows[rows[:, 0] <= rows[0, 0] + time_s]
     return float(np.linalg.norm(np.diff(rows[:, 1:4], axis=0), axis=1).sum())
 
@@ -75,14 +74,14 @@ def in_camera(rig, camera, axis, change):
     """A turn about an axis of the vehicle, or a move along it, as a vector in the camera's frame."""
     vector = np.zeros(3)
     vector[axis] = change
-    pose = yaml.safe_load(rig.read_text())["cameras"][camera]["vehicle_from_camera"]
-    return [round(float(value), 6) for value in rotations(np.array([pose["rotation_xyzw"]]))[0].T @ vector]
+    turn = vcharge.read_rig(rig)[camera].vehicle_from_camera[:3, :3]
+    return [round(float(value), 6) for value in turn.T @ vector]
 
 
 def errors_of(path, true_rig, name, camera):
     """Translation (cm) and rotation error (degrees) of one camera of a rig file."""
     errors = judge_rig(path, true_rig, path.with_suffix(f".{name}.json"))
-    index = list(yaml.safe_load(true_rig.read_text())["cameras"]).index(camera)
+    index = list(vcharge.read_rig(true_rig).cameras).index(camera)
     entry = errors["as_is"][index]
     return 100 * float(np.linalg.norm(entry["error_m"])), math.degrees(np.linalg.norm(entry["error_rad"]))
 

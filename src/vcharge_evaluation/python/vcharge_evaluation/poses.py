@@ -2,13 +2,12 @@
 import numpy as np
 import rosbag
 
+import vcharge
+
 
 def rotations(quaternions):
     """Rotation matrices (N x 3 x 3) of quaternions (N x 4, x y z w)."""
-    x, y, z, w = np.asarray(quaternions, float).T
-    return np.stack([np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1),
-                     np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1),
-                     np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1)], -2)
+    return vcharge.rotation_matrices(quaternions)
 
 
 def transform(translation, quaternion):
@@ -27,7 +26,7 @@ def nearest(times, wanted):
 
 def at_stamps(trajectory, times):
     """Rows of a TUM file (N x 8) nearest to the times."""
-    rows = np.loadtxt(trajectory)
+    rows = vcharge.read_trajectory(trajectory).rows
     return rows[nearest(rows[:, 0], times)]
 
 

@@ -6,12 +6,15 @@ import cv2
 import numpy as np
 from matplotlib.path import Path
 
+import vcharge
+
 from vcharge_evaluation.drawing.objects import rotation
-from vcharge_evaluation.drawing.obstacles import read_yaml, yaw_of
+from vcharge_evaluation.drawing.obstacles import read_yaml, yaw_of, yaw_of_matrix
 from vcharge_evaluation.drives import scenario_with_masks
 from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.tools import NoResult, say
+from vcharge.obstacle_map import FREE, OCCUPIED
 
 DRIVES = ("arrive_and_stand_lot",)
 REST_M = 0.02  # within so much of its position in the middle of the drive the vehicle stands
@@ -20,7 +23,6 @@ REACH_M = 8.0
 NEAR_M = 0.2  # an obstacle of the truth this near to a cell is in it: two cells
 MIN_HEIGHT_M = 0.15
 KEPT = "cells of what stands that are still occupied, least"
-OCCUPIED, FREE = 0, 254  # gray levels of map_server
 
 
 def arguments():
@@ -39,21 +41,15 @@ class Map:
     """Cells of one obstacle map by their positions in the fixed frame, which stays as long as the vehicle stands."""
 
     def __init__(self, folder, stamp):
-        meta = read_yaml(folder / f"{stamp}.yaml")
-        self.gray = cv2.imread(str(folder / f"{stamp}.pgm"), cv2.IMREAD_UNCHANGED)[::-1]
-        self.cell_m, self.origin_m = meta["resolution"], np.array(meta["origin"][:2])
-        self.here_m = np.array(meta["fixed_from_vehicle_translation_m"][:2])
-        self.yaw = yaw_of(meta["fixed_from_vehicle_rotation_xyzw"])
-
-    def centres(self):
-        """Positions of the cells, rows x columns x 2."""
-        rows, columns = np.indices(self.gray.shape)
-        return self.origin_m + (np.stack([columns, rows], -1) + 0.5) * self.cell_m
+        grid = vcharge.read_occupancy_grid(folder / f"{stamp}.yaml")
+        self.state, self.cell_m, self.origin_m = grid.state, grid.cell_size_m, grid.origin_m
+        self.here_m, self.yaw = grid.fixed_from_vehicle[:2, 3], yaw_of_matrix(grid.fixed_from_vehicle)
+        self.centres = grid.centres_m
 
     def draw(self, outlines, world_from_fixed):
         """Cells inside outlines in the world, corners N x 2, grown by NEAR_M."""
         turn, shift = world_from_fixed
-        picture = np.zeros(self.gray.shape, np.uint8)
+        picture = np.zeros(self.state.shape, np.uint8)
         for outline in outlines:
             cells = ((np.asarray(outline) - shift) @ turn - self.origin_m) / self.cell_m - 0.5
             cv2.fillPoly(picture, [np.round(cells).astype(np.int32)], 1)
@@ -65,7 +61,7 @@ class Map:
         turn, shift = world_from_fixed
         points = (self.centres() @ turn.T + shift).reshape(-1, 2)
         hits = [Path(outline).contains_points(points) for outline in outlines]
-        return np.any(hits, axis=0).reshape(self.gray.shape) if hits else np.zeros(self.gray.shape, bool)
+        return np.any(hits, axis=0).reshape(self.state.shape) if hits else np.zeros(self.state.shape, bool)
 
 
 def world_from_fixed(trajectory, stamp, held):
@@ -81,11 +77,10 @@ def tall(obstacles):
 
 def judge_standing(drive, folder):
     """Fractions of cells, for each map after the first settled one. NoResult without a standstill."""
-    trajectory = np.loadtxt(drive.trajectory)
+    trajectory = vcharge.read_trajectory(drive.trajectory).rows
     middle = trajectory[len(trajectory) // 2]
     rests = trajectory[np.linalg.norm(trajectory[:, 1:3] - middle[1:3], axis=1) < REST_M]
-    stamps = sorted(int(path.stem) for path in folder.glob("*.yaml") if path.stem.isdigit())
-    stamps = [stamp for stamp in stamps if rests[0, 0] + SETTLED_S <= stamp * 1e-9 <= rests[-1, 0]]
+    stamps = [stamp for stamp in vcharge.list_obstacle_maps(folder) if rests[0, 0] + SETTLED_S <= stamp * 1e-9 <= rests[-1, 0]]
     if not stamps:
         raise NoResult("no obstacle map while the vehicle stands")
     held = Map(folder, stamps[0])
@@ -94,19 +89,19 @@ def judge_standing(drive, folder):
     moving = {stamp: tall(movers[min(movers, key=lambda known, stamp=stamp: abs(known - stamp))]) for stamp in stamps}
     near = np.linalg.norm(held.centres() - held.here_m, axis=-1) < REACH_M
     standing = held.draw(tall(read_yaml(drive.truth / "obstacles.yaml")["obstacles"]), place)
-    solid = near & standing & (held.gray == OCCUPIED) & ~held.draw(moving[stamps[0]], place)
-    free = near & ~standing & (held.gray == FREE)
+    solid = near & standing & (held.state == OCCUPIED) & ~held.draw(moving[stamps[0]], place)
+    free = near & ~standing & (held.state == FREE)
     kept, still_free, wrong, under, under_free = [], [], [], 0, 0
     for stamp in stamps[1:]:
-        gray = Map(folder, stamp).gray
+        state = Map(folder, stamp).state
         hidden = held.draw(moving[stamp], place)
-        occupied = cv2.dilate((gray == OCCUPIED).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        occupied = cv2.dilate((state == OCCUPIED).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         kept.append(np.mean(occupied[solid & ~hidden]))
-        still_free.append(np.mean(gray[free & ~hidden] == FREE))
-        wrong.append(np.mean(gray[free & ~hidden] == OCCUPIED))
+        still_free.append(np.mean(state[free & ~hidden] == FREE))
+        wrong.append(np.mean(state[free & ~hidden] == OCCUPIED))
         below = near & held.inside(moving[stamp], place)
         under += below.sum()
-        under_free += (below & (gray == FREE)).sum()
+        under_free += (below & (state == FREE)).sum()
     return {"duration_s": (stamps[-1] - stamps[0]) * 1e-9, "cells": int(solid.sum()), "kept": np.array(kept),
             "still_free": np.array(still_free), "wrong": np.array(wrong), "under": int(under), "under_free": int(under_free)}
 

@@ -6,8 +6,8 @@ import matplotlib
 import numpy as np
 import yaml
 
+import vcharge
 from vcharge_evaluation import masks, obstacles, tools
-from vcharge_evaluation.camera_models import project
 from vcharge_evaluation.drawing.obstacles import FRONT_M
 from vcharge_evaluation.drawing.pictures import label
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
@@ -24,34 +24,35 @@ def pick(result, *keys):
 
 def lens_error(estimate, truth):
     """Angles from the axis (degrees) and distances (px) between the pixels of the same rays in two cameras, within the true
-    image, after the rotation between the two that fits best: extrinsics absorb this rotation."""
+    image, after the rotation between the two that fits best: extrinsics absorb this rotation. Infinite for rays without a pixel in
+    the estimated camera."""
     tilt, around = np.meshgrid(np.radians(np.arange(2.0, 92.5, 1.0)), np.radians(np.arange(0.0, 360.0, 5.0)))
     tilt, around = tilt.ravel(), around.ravel()
     rays = np.stack([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)], 1)
-    wanted = project(rays, truth)
-    inside = ((wanted >= 0) & (wanted < truth["image_size_px"])).all(1)
+    wanted = truth.project(rays)
+    inside = ((wanted >= 0) & (wanted < truth.image_size_px)).all(1)
     tilt, rays, wanted = tilt[inside], rays[inside], wanted[inside]
 
     def turned(angles):
-        return project(rays @ cv2.Rodrigues(np.array(angles, float))[0].T, estimate)
+        return estimate.project(rays @ cv2.Rodrigues(np.array(angles, float))[0].T)
 
     turn = np.zeros(3)
     for _ in range(5):
         residual = (turned(turn) - wanted).ravel()
         jacobian = np.stack([(turned(turn + step) - turned(turn)).ravel() / 1e-6 for step in 1e-6 * np.eye(3)], 1)
-        turn -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-    return np.degrees(tilt), np.linalg.norm(turned(turn) - wanted, axis=1)
+        known = np.isfinite(jacobian).all(1) & np.isfinite(residual)
+        turn -= np.linalg.lstsq(jacobian[known], residual[known], rcond=None)[0]
+    return np.degrees(tilt), np.nan_to_num(np.linalg.norm(turned(turn) - wanted, axis=1), nan=np.inf)
 
 
 def judge_intrinsics(path, truths, figures, picture):
-    estimate = yaml.safe_load(path.read_text())["cameras"]
+    estimate = vcharge.read_rig(path)
     figure, axes = plt.subplots(figsize=(7, 3.2))
     for camera, truth in truths.items():
-        true_camera = yaml.safe_load(truth.read_text())["cameras"][camera]
-        tilt, error = lens_error(estimate[camera], true_camera)
+        tilt, error = lens_error(estimate[camera], vcharge.read_rig(truth)[camera])
         bins = np.arange(0, 96, 5)
         # No pixel beyond the calibrated field of view is used.
-        known = tilt <= math.degrees(estimate[camera]["field_of_view_rad"]) / 2
+        known = tilt <= math.degrees(estimate[camera].field_of_view_rad) / 2
         figures[camera]["error_px"] = float(np.sqrt(np.mean(error[known] ** 2)))
         figures[camera]["max_error_px"] = float(error[known].max())
         which = np.digitize(tilt, bins)
@@ -80,7 +81,7 @@ def draw_masks(report, picture):
 
 
 def judge_masks(path, truth, figures):
-    cameras = masks.compare(truth.parent, yaml.safe_load(truth.read_text()), path.parent, yaml.safe_load(path.read_text()))
+    cameras = masks.compare(vcharge.read_rig(truth), vcharge.read_rig(path))
     total = sum(cameras.values(), masks.Pixels())
     figures.update({"hidden_percent": total.hidden_percent(), "lost_percent": total.lost_percent()})
 

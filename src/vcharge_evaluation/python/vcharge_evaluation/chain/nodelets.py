@@ -2,9 +2,9 @@
 import csv
 import time
 
-import cv2
 import numpy as np
 
+import vcharge
 from vcharge_evaluation.live.launch import START_S, Launch
 from vcharge_evaluation.poses import pose_of, stamp_ns
 
@@ -42,12 +42,8 @@ def offline_poses(path):
 
 
 def offline_grids(folder):
-    """Grid messages' arrays of the map_server pictures in a folder, by stamp. A picture's first row has the highest y."""
-    grids = {}
-    for path in sorted(folder.glob("*.pgm")):
-        picture = cv2.flip(cv2.imread(str(path), cv2.IMREAD_UNCHANGED), 0).astype(int)
-        grids[int(path.stem)] = np.where(picture == 254, 0, np.where(picture == 0, 100, -1)).astype(np.int8)
-    return grids
+    """Grid messages' arrays of the obstacle maps in a folder, by stamp."""
+    return {stamp: vcharge.read_occupancy_grid(folder / f"{stamp}.yaml").state for stamp in vcharge.list_obstacle_maps(folder)}
 
 
 def replay(work, map_path, bag, rig, folder):

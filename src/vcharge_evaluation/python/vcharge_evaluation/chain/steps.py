@@ -9,6 +9,7 @@ import sys
 
 import yaml
 
+import vcharge
 from vcharge_evaluation.chain import figures, nodelets, report
 from vcharge_evaluation.chain.arguments import arguments
 from vcharge_evaluation.chain.step_folders import StepFolders, fingerprint
@@ -118,7 +119,7 @@ class Chain(StepFolders):
 
     def masks(self, cameras, drive, needs):
         """The rig with masks of the own body, found in a drive. Masks that it has already are kept."""
-        if any("mask" in camera for camera in yaml.safe_load(cameras.read_text())["cameras"].values()):
+        if any(camera.mask is not None for camera in vcharge.read_rig(cameras)):
             self.keys["masks"] = self.keys["intrinsics"]
             return cameras
 
@@ -163,7 +164,7 @@ class Chain(StepFolders):
             result = run_tool("build_map", folder / "map.log", "--bag", drive / "drive.bag", "--rig", rig, "--output", path,
                               "--trajectory", folder / "map.tum", "--options", options, "--report", folder / "report")
             found = figures.pick(result, "verdict", "num_keyframes", "num_landmarks", "num_loop_edges", "content_hash")
-            camera = next(iter(yaml.safe_load(rig.read_text())["cameras"]))
+            camera = next(iter(vcharge.read_rig(rig))).name
             run([tool_path("draw_landmarks"), "--map", path, "--bag", drive / "drive.bag", "--camera", camera,
                  "--output", self.pictures / f"{name}_landmarks.png"], folder / "draw.log")
             if truth:
@@ -229,7 +230,7 @@ class Chain(StepFolders):
 
         def work(folder):
             # The options name cameras that another rig may not have.
-            cameras = set(yaml.safe_load(rig.read_text())["cameras"])
+            cameras = set(vcharge.read_rig(rig).cameras)
             words = ["--options", options] if {"front", "left", "rear", "right"} <= cameras else []
             result = run_tool("detect_obstacles", folder / "detect.log", "--bag", drive / "drive.bag", "--rig", rig, *words,
                               "--range-options", self.range_options(ranges, cameras, folder), "--output", folder / "maps")
@@ -315,9 +316,9 @@ class Chain(StepFolders):
         """Intrinsics from boards, masks and extrinsics from a drive, unless --rig has them."""
         given = self.args.rig
         if given and not self.args.boards:
-            cameras = yaml.safe_load(given.read_text())["cameras"]
+            cameras = vcharge.read_rig(given)
             self.keys["intrinsics"] = fingerprint(given)
-            if all("vehicle_from_camera" in camera for camera in cameras.values()):
+            if all(camera.vehicle_from_camera is not None for camera in cameras):
                 self.keys["extrinsics"] = fingerprint(given)
                 return given.resolve()
             path = given.resolve()

@@ -10,12 +10,14 @@ import pathlib
 import cv2
 import numpy as np
 
+import vcharge
 from vcharge_evaluation.drawing.objects import (MAGENTA, SIZE_PX, YELLOW, Reports, draw_from_above, draw_moment,
                                                 pixels_from_above, read_truth, rotation)
-from vcharge_evaluation.drawing.obstacles import Truth, read_yaml
-from vcharge_evaluation.drawing.pictures import label, pixels_of, read_images, save
+from vcharge_evaluation.drawing.obstacles import Truth
+from vcharge_evaluation.drawing.pictures import label, save
+from vcharge.obstacle_map import FREE, OCCUPIED, UNOBSERVED
 
-COLOURS = {254: (0, 110, 0), 0: (0, 0, 200), 205: (40, 40, 40)}  # of the gray levels of map_server
+COLOURS = {FREE: (0, 110, 0), OCCUPIED: (0, 0, 200), UNOBSERVED: (40, 40, 40)}
 # At an image's stamp, a map of at most this age is shown.
 MAX_MAP_AGE_NS = 500_000_000
 PAGE = """<!DOCTYPE html>
@@ -34,24 +36,23 @@ class Maps:
 
     def __init__(self, folder):
         self.folder = folder
-        self.stamps = sorted(int(path.stem) for path in folder.glob("*.yaml") if path.stem.isdigit())
+        self.stamps = vcharge.list_obstacle_maps(folder)
 
     def draw(self, stamp, pose):
         """The newest map of a stamp around the vehicle's pose (x, y, yaw) in the map's frame; None without one."""
         earlier = [known for known in self.stamps if 0 <= stamp - known <= MAX_MAP_AGE_NS]
         if not earlier:
             return None
-        gray = cv2.imread(str(self.folder / f"{earlier[-1]}.pgm"), cv2.IMREAD_UNCHANGED)
-        meta = read_yaml(self.folder / f"{earlier[-1]}.yaml")
-        picture = np.zeros((*gray.shape, 3), np.uint8)
-        for level, colour in COLOURS.items():
-            picture[gray == level] = colour
+        grid = vcharge.read_occupancy_grid(self.folder / f"{earlier[-1]}.yaml")
+        picture = np.zeros((*grid.state.shape, 3), np.uint8)
+        for state, colour in COLOURS.items():
+            picture[grid.state[::-1] == state] = colour
         # Where three points of the vehicle's frame are in the map and in the view.
         points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        cells = (points @ rotation(pose[2]).T + pose[:2] - meta["origin"][:2]) / meta["resolution"]
-        cells[:, 1] = len(gray) - cells[:, 1]
+        cells = (points @ rotation(pose[2]).T + pose[:2] - grid.origin_m) / grid.cell_size_m
+        cells[:, 1] = len(grid.state) - cells[:, 1]
         view_from_map = cv2.getAffineTransform((cells - 0.5).astype(np.float32), pixels_from_above(points).astype(np.float32))
-        return cv2.warpAffine(picture, view_from_map, (SIZE_PX, SIZE_PX), flags=cv2.INTER_NEAREST, borderValue=COLOURS[205])
+        return cv2.warpAffine(picture, view_from_map, (SIZE_PX, SIZE_PX), flags=cv2.INTER_NEAREST, borderValue=COLOURS[UNOBSERVED])
 
 
 def read_corridor(folder):
@@ -69,9 +70,9 @@ def read_corridor(folder):
 def moments(bag, cameras):
     """Stamp and images by camera of each moment of which all images are there."""
     waiting = {}
-    for stamp, camera, message in read_images(bag, cameras):
+    for stamp, camera, image in vcharge.read_images(bag, cameras):
         images = waiting.setdefault(stamp, {})
-        images[camera] = pixels_of(message)
+        images[camera] = image
         if len(images) == len(cameras):
             yield stamp, {name: images[name] for name in cameras}
             waiting = {later: found for later, found in waiting.items() if later > stamp}
@@ -79,7 +80,7 @@ def moments(bag, cameras):
 
 def pictures(arguments):
     """Stamp and picture of each moment."""
-    cameras = read_yaml(arguments.rig)["cameras"]
+    cameras = vcharge.read_rig(arguments.rig).cameras
     reports, maps, corridor = Reports(arguments.obstacles), Maps(arguments.obstacles), read_corridor(arguments.obstacles)
     words = ""
     for stamp, images in moments(arguments.bag, cameras):

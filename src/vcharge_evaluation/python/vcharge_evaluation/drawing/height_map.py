@@ -4,13 +4,14 @@ import pathlib
 
 import cv2
 import numpy as np
-import yaml
 
+import vcharge
 from vcharge_evaluation.drawing.pictures import save
+from vcharge.obstacle_map import FREE, OCCUPIED, UNOBSERVED
 
 SPAN_M = 1.8  # range of the colours, from a little below most of the ground
 BAR_M = 5.0  # length of the scale bar
-STATES = {254: (150, 200, 150), 0: (60, 60, 200), 205: (40, 40, 40)}  # drivable, obstacle, unobserved; BGR
+STATES = {FREE: (150, 200, 150), OCCUPIED: (60, 60, 200), UNOBSERVED: (40, 40, 40)}  # drivable, obstacle, unobserved; BGR
 
 
 def arguments():
@@ -56,11 +57,10 @@ def add_scales(picture, low, pixels_per_m):
 
 def main():
     args = arguments()
-    cell = yaml.safe_load((args.map / "height_map.yaml").read_text())["cell_size_m"]
-    heights = cv2.imread(str(args.map / "height_map.tiff"), cv2.IMREAD_UNCHANGED)
-    gray = cv2.imread(str(args.map / "height_map_gray.png"), cv2.IMREAD_GRAYSCALE)
-    states = cv2.imread(str(args.map / "drivable.pgm"), cv2.IMREAD_GRAYSCALE)[::-1]
-    rows, columns = np.nonzero(np.isfinite(heights) | (states != 205))  # walls have a state but no height
+    found = vcharge.read_height_map(args.map)
+    cell, heights, gray = found.cell_size_m, found.height_m, found.gray
+    states = vcharge.read_occupancy_grid(args.map / "drivable.yaml").state
+    rows, columns = np.nonzero(np.isfinite(heights) | (states != UNOBSERVED))  # walls have a state but no height
     if rows.size == 0:
         raise SystemExit(f"{args.map}: expected a height map with observed cells")
     part = np.s_[rows.min():rows.max() + 1, columns.min():columns.max() + 1]

@@ -4,6 +4,7 @@ import argparse
 import cv2
 import numpy as np
 
+import vcharge
 from vcharge_evaluation.drawing import objects, obstacles
 from vcharge_evaluation.drawing.pictures import read_image
 
@@ -28,9 +29,9 @@ def colour_ranges(range_m):
 
 def draw_range_map(bag, folder, camera):
     """Image and range map of a camera in the middle of a drive; `folder` is that of compute_range_maps."""
-    stamps = sorted(int(path.stem) for path in (folder / camera).glob("*.yaml"))
+    stamps = vcharge.list_range_maps(folder, camera)
     stamp = stamps[len(stamps) // 2]
-    ranges = colour_ranges(cv2.imread(str(folder / camera / f"{stamp}_range.tiff"), cv2.IMREAD_UNCHANGED))
+    ranges = colour_ranges(vcharge.read_range_map(folder, camera, stamp).range_m)
     parts = [cv2.cvtColor(read_image(bag, camera, stamp), cv2.COLOR_GRAY2BGR), ranges]
     return np.hstack([cv2.resize(part, (part.shape[1] * HEIGHT_PX // part.shape[0], HEIGHT_PX)) for part in parts])
 

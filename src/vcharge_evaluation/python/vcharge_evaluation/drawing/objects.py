@@ -1,12 +1,12 @@
 """Draws the tracked moving objects of one image: from above and over the four images, with the true ones."""
 import argparse
-import csv
 import math
 import pathlib
 
 import cv2
 import numpy as np
 
+import vcharge
 from vcharge_evaluation.drawing.obstacles import (CYAN, FRONT_M, HALF_WIDTH_M, MAGENTA, REAR_M, Truth, frame, projection_into,
                                                   read_yaml)
 from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_stamp, label, read_image, save
@@ -32,22 +32,16 @@ class Reports:
     """The reported objects of a drive: `folder` is that of detect_obstacles."""
 
     def __init__(self, folder):
-        with open(folder / "objects_frames.csv", encoding="utf-8") as file:
-            self.poses = {int(row["stamp_ns"]): [float(row[key]) for key in ("x_m", "y_m", "yaw_rad")] for row in csv.DictReader(file)}
-        self.rows = {}
-        with open(folder / "objects.csv", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                self.rows.setdefault(int(row["stamp_ns"]), []).append(row)
+        self.frames = {frame.stamp_ns: frame for frame in vcharge.read_objects(folder)}
+        self.poses = {stamp: [*frame.odom_from_vehicle[:2, 3], frame.yaw_rad] for stamp, frame in self.frames.items()}
 
     def at(self, stamp):
         """Bodies of a stamp; none where nothing was reported."""
         bodies = []
-        for row in self.rows.get(stamp, []):
+        for one in self.frames[stamp].objects if stamp in self.frames else ():
             here, turn = np.array(self.poses[stamp][:2]), rotation(self.poses[stamp][2])
-            corners = np.array([[float(word) for word in corner.split(" ")] for corner in row["footprint_m"].split(";")])
-            centre, velocity = (np.array([float(row[key]) for key in keys]) for keys in (("x_m", "y_m"), ("vx_m_per_s", "vy_m_per_s")))
-            bodies.append(Body((corners - here) @ turn, (centre - here) @ turn, velocity @ turn, 0.0, float(row["height_m"]),
-                               f"{row['id']} {row['class']}"))
+            bodies.append(Body((one.footprint_m - here) @ turn, (one.position_m - here) @ turn, one.velocity_m_per_s @ turn, 0.0,
+                               one.height_m, f"{one.id} {one.object_class}"))
         return bodies
 
 
@@ -107,7 +101,7 @@ def draw(bag, rig, folder, truth_folder, stamp):
     """The picture (BGR) of a stamp (ns)."""
     truth = Truth(truth_folder, stamp)
     groups = ((MAGENTA, read_truth(truth)), (YELLOW, Reports(folder).at(stamp)))
-    cameras = read_yaml(rig)["cameras"]
+    cameras = vcharge.read_rig(rig).cameras
     above = draw_from_above([truth.footprint(obstacle) for obstacle in truth.standing], groups)
     return draw_moment(above, {name: read_image(bag, name, stamp) for name in cameras}, cameras, groups)
 

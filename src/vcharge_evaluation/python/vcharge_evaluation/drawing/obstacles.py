@@ -2,7 +2,6 @@
 free, red occupied, dark unknown) with the vehicle (white) and, if the truth is given, the true outlines of what stands (cyan)
 and moves (magenta)."""
 import argparse
-import csv
 import math
 import pathlib
 
@@ -10,33 +9,22 @@ import cv2
 import numpy as np
 import yaml
 
-from vcharge_evaluation.camera_models import project
+import vcharge
 from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_stamp, read_image, save
-from vcharge_evaluation.poses import rotations
+from vcharge.obstacle_map import FREE, OCCUPIED, UNOBSERVED
 
 PIXELS_PER_CELL = 4
 FRONT_M, REAR_M, HALF_WIDTH_M = 3.7, -0.9, 0.9  # outline of the simulated car about the origin of its frame
 CYAN, MAGENTA = (255, 255, 0), (255, 0, 255)
 
 
-def read_scans(path):
-    scans = {}
-    with open(path) as file:
-        for row in csv.DictReader(file):
-            scans.setdefault(row["name"], []).append({key: float(value) for key, value in row.items() if key != "name"})
-    return scans
-
-
 def projection_into(camera):
     """Function from points (N x 3, in the vehicle's frame) to pixels (N x 2), and whether each is in front of the camera."""
-    pose = camera["vehicle_from_camera"]
-    rotation = rotations([pose["rotation_xyzw"]])[0]
-    translation = np.array(pose["translation_m"])
-
     def pixels_of(points):
-        in_camera = (np.array(points) - translation) @ rotation
+        in_camera = camera.camera_from_vehicle(points)
+        pixels = camera.project(in_camera)
         in_front = in_camera[:, 2] > np.linalg.norm(in_camera, axis=1) * math.cos(math.radians(88))
-        return project(in_camera, camera), in_front
+        return pixels, in_front & np.isfinite(pixels).all(1)
     return pixels_of
 
 
@@ -52,19 +40,18 @@ def draw_over_image(image, scan, camera, truth):
     """Obstacles as vertical bars up to their heights, free ground as green dots, what truly moves in frames."""
     picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     pixels_of = projection_into(camera)
-    for ray in scan:
-        direction = np.array([math.cos(ray["angle_rad"]), math.sin(ray["angle_rad"])])
-        origin = np.array([ray["origin_x_m"], ray["origin_y_m"]])
+    for angle, distance, free_m, height in zip(scan.angle_rad, scan.range_m, scan.free_m, scan.height_m):
+        direction = np.array([math.cos(angle), math.sin(angle)])
 
-        def at(distance, z):
-            return [*(origin + distance * direction), z]
-        free = [at(d, 0.0) for d in np.arange(0.4, ray["free_m"], 0.15)]
+        def at(distance, z, direction=direction):
+            return [*(scan.origin_m + distance * direction), z]
+        free = [at(d, 0.0) for d in np.arange(0.4, free_m, 0.15)]
         if free:
             for pixel, ok in zip(*pixels_of(free)):
                 if ok:
                     cv2.circle(picture, tuple(int(v) for v in pixel), 1, (0, 200, 0), -1)
-        if not math.isnan(ray["range_m"]):
-            ends, ok = pixels_of([at(ray["range_m"], 0.0), at(ray["range_m"], ray["height_m"])])
+        if not math.isnan(distance):
+            ends, ok = pixels_of([at(distance, 0.0), at(distance, height)])
             if ok.all():
                 cv2.line(picture, tuple(int(v) for v in ends[0]), tuple(int(v) for v in ends[1]), (0, 0, 255), 2)
     for mover in truth.moving if truth else ():
@@ -79,24 +66,26 @@ def draw_scan(scan, size, metres=6.0):
 
     def pixel(x, y):
         return int(size / 2 + (x - 1.9) * per_metre), int(size / 2 - y * per_metre)
-    half = 0.5 * (scan[1]["angle_rad"] - scan[0]["angle_rad"])
-    for ray in scan:
-        origin = (ray["origin_x_m"], ray["origin_y_m"])
-        if ray["free_m"] > 0:
-            corners = [pixel(*origin)] + [
-                pixel(origin[0] + ray["free_m"] * math.cos(ray["angle_rad"] + side),
-                      origin[1] + ray["free_m"] * math.sin(ray["angle_rad"] + side)) for side in (-half, half)]
+
+    def at(distance, angle):
+        return pixel(scan.origin_m[0] + distance * math.cos(angle), scan.origin_m[1] + distance * math.sin(angle))
+    half = 0.5 * (scan.angle_rad[1] - scan.angle_rad[0])
+    for angle, free_m in zip(scan.angle_rad, scan.free_m):
+        if free_m > 0:
+            corners = [pixel(*scan.origin_m), at(free_m, angle - half), at(free_m, angle + half)]
             cv2.fillPoly(picture, [np.array(corners)], (110, 110, 110))
-    for ray in scan:
-        if not math.isnan(ray["range_m"]):
-            cv2.circle(picture, pixel(ray["origin_x_m"] + ray["range_m"] * math.cos(ray["angle_rad"]),
-                                      ray["origin_y_m"] + ray["range_m"] * math.sin(ray["angle_rad"])),
-                       2, (255, 255, 255), -1)
+    for angle, distance in zip(scan.angle_rad, scan.range_m):
+        if not math.isnan(distance):
+            cv2.circle(picture, at(distance, angle), 2, (255, 255, 255), -1)
     return picture
 
 
 def yaw_of(q):
     return 2 * math.atan2(q[2], q[3])
+
+
+def yaw_of_matrix(transform):
+    return math.atan2(transform[1, 0], transform[0, 0])
 
 
 def read_yaml(path):
@@ -107,7 +96,7 @@ class Truth:
     """What stands and what moves at one stamp, in the vehicle's frame."""
 
     def __init__(self, folder, stamp_ns):
-        poses = np.loadtxt(folder / "trajectory.tum")
+        poses = vcharge.read_trajectory(folder / "trajectory.tum").rows
         pose = poses[np.argmin(abs(poses[:, 0] - stamp_ns * 1e-9))]
         self.position_m, yaw = pose[1:4], yaw_of(pose[4:])
         self.turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
@@ -127,19 +116,19 @@ class Truth:
 
 
 def draw_map(folder, stamp, truth):
-    gray = cv2.imread(str(folder / f"{stamp}.pgm"), cv2.IMREAD_UNCHANGED)
-    meta = yaml.safe_load((folder / f"{stamp}.yaml").read_text())
-    picture = np.zeros((*gray.shape, 3), np.uint8)
-    picture[gray == 254], picture[gray == 0], picture[gray == 205] = (0, 160, 0), (0, 0, 255), (40, 40, 40)
+    grid = vcharge.read_occupancy_grid(folder / f"{stamp}.yaml")
+    state = grid.state[::-1]
+    picture = np.zeros((*state.shape, 3), np.uint8)
+    picture[state == FREE], picture[state == OCCUPIED], picture[state == UNOBSERVED] = (0, 160, 0), (0, 0, 255), (40, 40, 40)
     k = PIXELS_PER_CELL
     picture = cv2.resize(picture, None, fx=k, fy=k, interpolation=cv2.INTER_NEAREST)
-    here, yaw = np.array(meta["fixed_from_vehicle_translation_m"][:2]), yaw_of(meta["fixed_from_vehicle_rotation_xyzw"])
+    here, yaw = grid.fixed_from_vehicle[:2, 3], yaw_of_matrix(grid.fixed_from_vehicle)
 
     def outline(points_in_vehicle, colour):
         c, s = math.cos(yaw), math.sin(yaw)
         fixed = np.asarray(points_in_vehicle) @ np.array([[c, s], [-s, c]]) + here
-        cells = (fixed - meta["origin"][:2]) / meta["resolution"] * k
-        cv2.polylines(picture, [np.stack([cells[:, 0], gray.shape[0] * k - cells[:, 1]], 1).astype(int)], True, colour, 1)
+        cells = (fixed - grid.origin_m) / grid.cell_size_m * k
+        cv2.polylines(picture, [np.stack([cells[:, 0], len(state) * k - cells[:, 1]], 1).astype(int)], True, colour, 1)
 
     outline([[FRONT_M, HALF_WIDTH_M], [FRONT_M, -HALF_WIDTH_M], [REAR_M, -HALF_WIDTH_M], [REAR_M, HALF_WIDTH_M]], (255, 255, 255))
     for obstacles, colour in ((truth.standing, CYAN), (truth.moving, MAGENTA)) if truth else ():
@@ -162,16 +151,15 @@ def main():
 
 def draw(arguments):
     """Writes the picture; `arguments` as of the command line."""
-    cameras = yaml.safe_load(arguments.rig.read_text())["cameras"]
+    cameras = vcharge.read_rig(arguments.rig).cameras
     arguments.camera = arguments.camera or ("left" if "left" in cameras else next(iter(cameras)))
     camera = cameras[arguments.camera]
-    stamps = sorted(int(path.stem) for path in arguments.obstacles.glob("*.yaml") if path.stem.isdigit())
-    with_camera = [stamp for stamp in stamps
-                   if arguments.camera in read_scans(arguments.obstacles / f"{stamp}_scans.csv")]
+    with_camera = [stamp for stamp in vcharge.list_obstacle_maps(arguments.obstacles)
+                   if arguments.camera in vcharge.read_obstacle_scans(arguments.obstacles, stamp)]
     if not with_camera:
         raise SystemExit(f"{arguments.obstacles}: no scan of camera '{arguments.camera}'")
     stamp = chosen_stamp(arguments, with_camera)
-    scan = read_scans(arguments.obstacles / f"{stamp}_scans.csv")[arguments.camera]
+    scan = vcharge.read_obstacle_scans(arguments.obstacles, stamp)[arguments.camera]
     truth = Truth(arguments.truth, stamp) if arguments.truth else None
     over = draw_over_image(read_image(arguments.bag, arguments.camera, stamp), scan, camera, truth)
     fused = draw_map(arguments.obstacles, stamp, truth)

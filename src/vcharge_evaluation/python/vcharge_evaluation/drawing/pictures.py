@@ -2,8 +2,8 @@
 import os
 
 import cv2
-import numpy as np
-import rosbag
+
+import vcharge
 
 
 def save(path, picture):
@@ -31,27 +31,10 @@ def save_small(path, picture):
         scale *= 0.8
 
 
-def pixels_of(message):
-    """The gray pixels of an image message, raw or compressed."""
-    data = np.frombuffer(message.data, np.uint8)
-    if hasattr(message, "format"):
-        return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)
-    return data.reshape(message.height, message.step)[:, :message.width]
-
-
-def read_images(bag_path, cameras):
-    """Stamp (ns), camera and message of each image of these cameras, in the bag's order."""
-    names = {f"/camera/{camera}/image_raw{ending}": camera for camera in cameras for ending in ("", "/compressed")}
-    with rosbag.Bag(str(bag_path)) as bag:
-        for topic, message, _ in bag.read_messages(topics=list(names)):
-            yield message.header.stamp.to_nsec(), names[topic], message
-
-
 def read_image(bag_path, camera, stamp_ns):
     """The camera's gray image of this stamp. SystemExit without one."""
-    for stamp, _, message in read_images(bag_path, [camera]):
-        if stamp == stamp_ns:
-            return pixels_of(message)
+    for _, _, image in vcharge.read_images(bag_path, [camera], [stamp_ns]):
+        return image
     raise SystemExit(f"{bag_path}: no image of camera '{camera}' at {stamp_ns} ns")
 
 

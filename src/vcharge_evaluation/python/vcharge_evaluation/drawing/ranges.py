@@ -5,10 +5,10 @@ import pathlib
 import cv2
 import numpy as np
 import rosbag
-import yaml
 
+import vcharge
 from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_stamp, label, read_image, save
-from vcharge_evaluation.poses import pose_of, stamp_ns, transform
+from vcharge_evaluation.poses import pose_of, transform
 
 CLOUD_CELL_M = 0.05
 MAX_RELATIVE_SIGMA = 0.05
@@ -19,27 +19,12 @@ def read_poses(arguments):
     """Stamp (ns) -> world_from_vehicle: the truth if it is given, else the drive's odometry."""
     poses = {}
     if arguments.truth:
-        for line in (arguments.truth / "trajectory.tum").read_text().splitlines():
-            fields = line.split("#")[0].split()
-            if fields:
-                values = [float(field) for field in fields[1:]]
-                poses[stamp_ns(fields[0])] = transform(values[:3], values[3:])
-        return poses
+        trajectory = vcharge.read_trajectory(arguments.truth / "trajectory.tum")
+        return dict(zip(trajectory.stamps_ns.tolist(), trajectory.world_from_vehicle))
     with rosbag.Bag(str(arguments.bag)) as bag:
         for _, message, _ in bag.read_messages(topics=["/odom"]):
             poses[message.header.stamp.to_nsec()] = transform(*pose_of(message))
     return poses
-
-
-def rays_of(size, mei):
-    """Unit rays of a Mei camera without distortion (paper, section Camera Model), 3 x H x W; NaN where a pixel has none."""
-    u, v = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
-    x = (u - mei["u0"]) / mei["gamma1"]
-    y = (v - mei["v0"]) / mei["gamma2"]
-    r = x * x + y * y
-    discriminant = 1 + (1 - mei["xi"] ** 2) * r
-    scale = (mei["xi"] + np.sqrt(np.where(discriminant > 0, discriminant, np.nan))) / (r + 1)
-    return np.stack([scale * x, scale * y, scale - mei["xi"]])
 
 
 class Cloud:
@@ -63,11 +48,11 @@ class Cloud:
     def draw(self, truth, poses):
         canvas = np.full(self.height.shape + (3,), 30, np.uint8)
         if truth:
-            meta = yaml.safe_load((truth / "height_map.yaml").read_text())
-            heights = cv2.imread(str(truth / "height_map.tiff"), cv2.IMREAD_UNCHANGED)
+            surface = vcharge.read_height_map(truth)
+            heights = surface.height_m
             rows, columns = np.indices(self.height.shape)
-            column = np.round((columns * CLOUD_CELL_M + self.low[0] - meta["origin_m"][0]) / meta["cell_size_m"])
-            row = np.round((rows * CLOUD_CELL_M + self.low[1] - meta["origin_m"][1]) / meta["cell_size_m"])
+            column = np.round((columns * CLOUD_CELL_M + self.low[0] - surface.origin_m[0]) / surface.cell_size_m)
+            row = np.round((rows * CLOUD_CELL_M + self.low[1] - surface.origin_m[1]) / surface.cell_size_m)
             inside = (column >= 0) & (row >= 0) & (column < heights.shape[1]) & (row < heights.shape[0])
             sampled = np.full(self.height.shape, np.nan, np.float32)
             sampled[inside] = heights[row[inside].astype(int), column[inside].astype(int)]
@@ -93,35 +78,25 @@ def main():
     parser.add_argument("--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
 
-    rig = yaml.safe_load(arguments.rig.read_text())["cameras"]
+    rig = vcharge.read_rig(arguments.rig)
     poses = read_poses(arguments)
     cloud = Cloud(poses)
     inputs, ranges = [], []
-    for camera, description in rig.items():
-        folder = arguments.range / camera
-        stamps = sorted(int(path.stem) for path in folder.glob("*.yaml"))
-        if not stamps:
-            continue
-        extrinsics = description["vehicle_from_camera"]
-        vehicle_from_camera = transform(extrinsics["translation_m"], extrinsics["rotation_xyzw"])
-        meta = yaml.safe_load((folder / f"{stamps[0]}.yaml").read_text())
-        rays = None
-        for stamp in stamps:
-            distance = cv2.imread(str(folder / f"{stamp}_range.tiff"), cv2.IMREAD_UNCHANGED)
-            sigma = cv2.imread(str(folder / f"{stamp}_sigma.tiff"), cv2.IMREAD_UNCHANGED)
-            confidence = cv2.imread(str(folder / f"{stamp}_confidence.tiff"), cv2.IMREAD_UNCHANGED)
-            if rays is None:
-                rays = rays_of(distance.shape[::-1], meta["mei"])
-            if stamp not in poses:
-                continue
+    known = vcharge.list_range_map_cameras(arguments.range)
+    for camera in (name for name in rig.cameras if name in known):
+        stamps, rays = vcharge.list_range_maps(arguments.range, camera), None
+        for stamp in (stamp for stamp in stamps if stamp in poses):
+            found = vcharge.read_range_map(arguments.range, camera, stamp)
+            rays = found.rays() if rays is None else rays
             with np.errstate(invalid="ignore"):
-                good = (sigma < MAX_RELATIVE_SIGMA * distance) & (confidence > MIN_CONFIDENCE) & (distance < 15)
-            points = np.vstack([rays[:, good] * distance[good], np.ones(good.sum())])
-            cloud.add((poses[stamp] @ vehicle_from_camera @ points)[:3])
+                good = (found.standard_deviation_m < MAX_RELATIVE_SIGMA * found.range_m) & (found.confidence > MIN_CONFIDENCE) & \
+                    (found.range_m < 15)
+            points = np.vstack([(rays[good] * found.range_m[good][:, None]).T, np.ones(good.sum())])
+            cloud.add((poses[stamp] @ rig[camera].vehicle_from_camera @ points)[:3])
         shown = chosen_stamp(arguments, stamps)
         image = read_image(arguments.bag, camera, shown)
         inputs.append(label(cv2.resize(image, (640, 400), interpolation=cv2.INTER_AREA), camera))
-        picture = cv2.imread(str(folder / f"{shown}_range.png"))
+        picture = cv2.imread(str(arguments.range / camera / f"{shown}_range.png"))
         ranges.append(label(cv2.resize(picture, (640, 400), interpolation=cv2.INTER_NEAREST), f"{camera} range"))
 
     def mosaic(pictures):

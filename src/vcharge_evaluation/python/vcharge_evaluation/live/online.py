@@ -11,8 +11,8 @@ import threading
 import time
 
 import numpy as np
-import yaml
 
+import vcharge
 from vcharge_evaluation.live.flame_graph import Recording, by_stage, draw, shares
 from vcharge_evaluation.live.launch import START_S, Launch
 from vcharge_evaluation.live.processes import Usage, manager_below
@@ -163,7 +163,7 @@ def profile(recording, path):
 
 def main():
     args = arguments()
-    cameras = list(yaml.safe_load(args.rig.read_text())["cameras"])
+    cameras = list(vcharge.read_rig(args.rig).cameras)
     load = Figure("load of the machine before", os.getloadavg()[0])
     results, found = Results("online", "The nodelets online", args), {}
     for machine in args.machines:
