@@ -174,6 +174,7 @@ class ObjectsTest(unittest.TestCase):
         # Objects of another drive: an error, and the film that is there stays.
         before = (output / "film.webm").read_bytes()
         write_table(folder / "objects_frames.csv", FRAME_COLUMNS, [])
+        write_table(folder / "objects.csv", COLUMNS, [])
         with self.assertRaises(SystemExit) as failure:
             self.film(folder)
         self.assertIn("objects_frames.csv", str(failure.exception))
@@ -185,9 +186,9 @@ class ObjectsTest(unittest.TestCase):
         gray = np.full((200, 200), 205, np.uint8)
         gray[200 - 1 - 150, 100] = 0  # x 0 m, y 5 m
         cv2.imwrite(str(folder / "5.pgm"), gray)
-        (folder / "5.yaml").write_text("resolution: 0.1\norigin: [-10.05, -10.05, 0.0]\n")
+        (folder / "5.yaml").write_text("image: 5.pgm\nresolution: 0.1\norigin: [-10.05, -10.05, 0.0]\n")
         picture = film.Maps(folder).draw(5, [0.0, 0.0, math.pi / 2])
-        rows, columns = np.nonzero((picture == film.COLOURS[0]).all(2))
+        rows, columns = np.nonzero((picture == film.COLOURS[film.OCCUPIED]).all(2))
         expected = pixels_from_above([[5.0, 0.0]])[0]
         self.assertLess(math.hypot(columns.mean() - expected[0], rows.mean() - expected[1]), 2.0)
         self.assertIsNone(film.Maps(folder).draw(4, [0.0, 0.0, 0.0]))
