@@ -4,6 +4,7 @@
 
 #include <octomap/OcTree.h>
 
+#include "bay_messages.h"
 #include "corridor_messages.h"
 #include "obstacle_messages.h"
 #include "vcharge_ros/conversions.h"
@@ -25,6 +26,7 @@ ObstaclePublisher::ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<cons
       steps_(node->advertise<nav_msgs::OccupancyGrid>("/obstacles/steps", queue_size, true)),
       scan_(node->advertise<sensor_msgs::LaserScan>("/obstacles/scan", queue_size)),
       corridor_(node->advertise<vcharge_msgs::Corridor>("/obstacles/corridor", queue_size)),
+      gaps_(node->advertise<vcharge_msgs::ParkingBays>("/parking/gaps", queue_size)),
       markers_(node->advertise<visualization_msgs::MarkerArray>("/obstacles/markers", queue_size)),
       octomap_(node->advertise<octomap_msgs::Octomap>("/obstacles/octomap", queue_size)) {
   std::vector<geometry_msgs::TransformStamped> frames;
@@ -46,6 +48,7 @@ void ObstaclePublisher::publish(const ObstacleFrame& frame) const {
   steps_.publish(toMessage(frame.steps));
   scan_.publish(toMessage(frame.scan, rig_->vehicle_frame));
   corridor_.publish(toMessage(frame.corridor, frame.map.stamp, rig_->vehicle_frame));
+  gaps_.publish(toMessage(frame.gaps, frame.map.stamp, frame.map.frame_id));
   if (markers_.getNumSubscribers() > 0) {
     visualization_msgs::MarkerArray markers = toMarkers(frame.map);
     for (visualization_msgs::Marker& strip :

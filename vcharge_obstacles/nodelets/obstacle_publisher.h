@@ -14,8 +14,8 @@
 namespace vcharge {
 
 /// Publishes /obstacles/grid and /obstacles/steps (latched), /obstacles/scan, /obstacles/corridor,
-/// /obstacles/markers, /obstacles/octomap, /obstacles/<camera>/scan, /obstacles/<camera>/ground_plane, and
-/// the scans' frames on /tf_static.
+/// /parking/gaps, /obstacles/markers, /obstacles/octomap, /obstacles/<camera>/scan,
+/// /obstacles/<camera>/ground_plane, and the scans' frames on /tf_static.
 class ObstaclePublisher {
  public:
   ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<const CameraRig> rig,
@@ -29,7 +29,7 @@ class ObstaclePublisher {
   };
 
   const std::shared_ptr<const CameraRig> rig_;
-  ros::Publisher grid_, steps_, scan_, corridor_, markers_, octomap_;
+  ros::Publisher grid_, steps_, scan_, corridor_, gaps_, markers_, octomap_;
   std::map<std::string, Camera> cameras_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
 };

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "parking_output.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
@@ -30,7 +31,7 @@ namespace {
 using namespace vcharge;
 
 struct Arguments {
-  std::string bag, rig, vehicle, options, range_options, object_options, range, output;
+  std::string bag, rig, vehicle, bays, trajectory, options, range_options, object_options, range, output;
   std::vector<std::string> cameras;
   bool show_options = false, no_objects = false;
 };
@@ -205,6 +206,7 @@ class Recorder {
     }
     writeObstacles(frame.map, scans, folder_);
     writeStepMap(frame.steps, folder_);
+    gaps_ += gapRows(frame);
     addToHash(frame.map, &hasher_);
     addToHash(frame.steps, &hasher_);
     for (const ObstacleScan& scan : scans) {
@@ -232,6 +234,7 @@ class Recorder {
     }
     writeTextFileAtomically(folder_ + "/status.csv", table_);
     writeTextFileAtomically(folder_ + "/corridor.csv", corridors_);
+    writeTextFileAtomically(folder_ + "/gaps.csv", gaps_);
     nlohmann::json cameras = nlohmann::json::array();
     for (const ObstacleCameraStatus& status : mapper.status()) {
       std::cout << status.camera_name << ": " << status.range_maps << " range maps (" << status.without_pose
@@ -271,7 +274,7 @@ class Recorder {
   }
 
   const std::string folder_;
-  std::string table_, corridors_;
+  std::string table_, corridors_, gaps_ = kGapColumns;
   ContentHasher hasher_;
   uint64_t num_frames_ = 0;
   std::vector<ObjectFrame> object_frames_;
@@ -293,7 +296,14 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   Recorder recorder(output.path());
   ProcessorTime writing;
   std::unique_ptr<ObjectTracker> tracker;
+  std::unique_ptr<BayRecorder> bays;
+  if (!arguments.bays.empty()) {
+    bays = std::make_unique<BayRecorder>(arguments.bays, arguments.trajectory);
+  }
   ObstacleMapper mapper(rig, options, [&](const ObstacleFrame& frame) {
+    if (bays) {
+      bays->add(frame.map);
+    }
     if (tracker) {
       tracker->setObstacles(frame.map);
     }
@@ -323,6 +333,9 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
     throw InputError(arguments.bag + ": no obstacle map could be made (" + reasons + ")");
   }
   recorder.finish(mapper, found);
+  if (bays) {
+    bays->finish(arguments.trajectory, output.path());
+  }
   pipeline.reportTiming(writing.seconds(), found);
   output.commit();
 }
@@ -334,12 +347,18 @@ int main(int argc, char** argv) {
       "Detects obstacles and free ground around the vehicle in a recorded drive. Writes the fused map (PGM "
       "and "
       "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, the state of the cameras "
-      "(status.csv), the free travel along the vehicle's arc (corridor.csv), and what moves (objects.csv, "
-      "objects_frames.csv).");
+      "(status.csv), the free travel along the vehicle's arc (corridor.csv), gaps to park in (gaps.csv), "
+      "what moves (objects.csv, "
+      "objects_frames.csv), and with --bays which parking bays are free (bays.yaml, bays.csv).");
   Arguments arguments;
   app.addOption("--bag", &arguments.bag, "the drive").required();
   app.addOption("--rig", &arguments.rig, "rig.yaml with vehicle_from_camera").required();
   app.addOption("--vehicle", &arguments.vehicle, "YAML with the size of the vehicle (default: a Golf)");
+  auto bays = app.addOption("--bays", &arguments.bays, "bays of map_bays: which are free");
+  auto trajectory = app.addOption("--trajectory", &arguments.trajectory,
+                                  "poses of localize_drive in the map of the bays (TUM)");
+  bays.needs(trajectory);
+  trajectory.needs(bays);
   app.addOption("--options", &arguments.options, "YAML with overrides of ObstacleMapperOptions");
   app.addOption("--range-options", &arguments.range_options, "YAML with overrides of RangeMapperOptions");
   app.addOption("--object-options", &arguments.object_options, "YAML with overrides of ObjectTrackerOptions");

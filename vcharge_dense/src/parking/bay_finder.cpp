@@ -5,8 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include <opencv2/imgproc.hpp>
-
 #include "parking/bay_rows.h"
 #include "parking/ground_image.h"
 #include "parking/paint_lines.h"
@@ -17,45 +15,19 @@ namespace vcharge {
 namespace {
 
 /// Corners of the bay after a divider, counter-clockwise from above.
-std::array<Eigen::Vector2d, 4> cornersOf(const BayRow& row, size_t index) {
+Quadrangle cornersOf(const BayRow& row, size_t index) {
   const Eigen::Vector2d near_m = row.entry_m + static_cast<double>(index) * row.step_m;
   const Eigen::Vector2d next_m = near_m + row.step_m;
   const bool is_left = rightOf(row.step_m).dot(row.depth_m) < 0.0;
-  return is_left ? std::array<Eigen::Vector2d, 4>{near_m, next_m, next_m + row.depth_m, near_m + row.depth_m}
-                 : std::array<Eigen::Vector2d, 4>{next_m, near_m, near_m + row.depth_m, next_m + row.depth_m};
+  return is_left ? Quadrangle{near_m, next_m, next_m + row.depth_m, near_m + row.depth_m}
+                 : Quadrangle{next_m, near_m, near_m + row.depth_m, next_m + row.depth_m};
 }
 
-/// Cells of a quadrangle, as a mask of its bounding box.
-struct Cells {
-  cv::Rect box;
-  cv::Mat inside;  ///< CV_8UC1
-};
-
-Cells cellsOf(const GroundImage& ground, const std::array<Eigen::Vector2d, 4>& corners_m) {
-  std::vector<cv::Point> outline;
-  for (const Eigen::Vector2d& corner_m : corners_m) {
-    const Eigen::Vector2d cell = ground.cellOf(corner_m);
-    outline.emplace_back(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
+AreaCells cellsIn(const GroundImage& ground, Quadrangle corners_m) {
+  for (Eigen::Vector2d& corner : corners_m) {
+    corner = ground.cellOf(corner);
   }
-  Cells cells;
-  cells.box = cv::boundingRect(outline) & cv::Rect({0, 0}, ground.isGround().size());
-  cells.inside = cv::Mat(cells.box.size(), CV_8UC1, cv::Scalar(0));
-  if (!cells.box.empty()) {
-    cv::fillPoly(cells.inside, std::vector<std::vector<cv::Point>>{outline}, cv::Scalar(1), cv::LINE_8, 0,
-                 -cells.box.tl());
-  }
-  return cells;
-}
-
-/// A part of a bay, from fractions of its width and of its length from the entry on.
-std::array<Eigen::Vector2d, 4> partOf(const ParkingBay& bay, double from_side, double to_side,
-                                      double from_entry, double to_entry) {
-  const auto& c = bay.corners_m;
-  const auto at = [&](double side, double in) -> Eigen::Vector2d {
-    const Eigen::Vector2d entry_m = c[0] + side * (c[1] - c[0]), end_m = c[3] + side * (c[2] - c[3]);
-    return entry_m + in * (end_m - entry_m);
-  };
-  return {at(from_side, from_entry), at(to_side, from_entry), at(to_side, to_entry), at(from_side, to_entry)};
+  return cellsOf(corners_m, ground.isGround().size());
 }
 
 /// Height of the ground around a bay. NaN if none is seen.
@@ -75,13 +47,10 @@ double groundHeight(const HeightMap& map, const GroundImage& ground, cv::Rect bo
   return heights.empty() ? std::numeric_limits<double>::quiet_NaN() : quantile(std::move(heights), 0.5);
 }
 
-/// What stands in a bay. A car reaches beyond the middle of its bay whichever way it is parked, so that bare
-/// ground there means that the bay is free.
+/// What stands in a bay. Bare ground in its middle means that it is free.
 BayState stateOf(const HeightMap& map, const GroundImage& ground, const ParkingBay& bay) {
   constexpr double kMinHeight_m = 0.25, kMaxHeight_m = 2.5, kMinCar_m2 = 0.6, kMinSeen = 0.5;
-  // Cars beside the bay may reach over its lines, and there may be wheel stops or a wall at its end.
-  const Cells inner = cellsOf(ground, partOf(bay, 0.15, 0.85, 0.0, 0.9));
-  const Cells middle = cellsOf(ground, partOf(bay, 0.15, 0.85, 0.3, 0.6));
+  const AreaCells inner = cellsIn(ground, bay.inside()), middle = cellsIn(ground, bay.middle());
   if (inner.box.empty() || middle.box.empty()) {
     return BayState::kUnknown;
   }

@@ -12,6 +12,7 @@
 #include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_core/motion/vehicle_footprint.h"
 #include "vcharge_obstacles/corridor.h"
+#include "vcharge_obstacles/gap_finder.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
@@ -93,6 +94,7 @@ struct ObstacleFrame {
   StepMap steps;      ///< kerbs, holes and other steps near the vehicle, also those too low for the map
   ObstacleScan scan;  ///< scan of the fused map
   Corridor corridor;  ///< for the curvature of the path that the vehicle drives
+  std::vector<ParkingGap> gaps;          ///< beside the path, in which the vehicle can park
   std::vector<CameraObstacles> cameras;  ///< observations added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
@@ -175,6 +177,7 @@ class ObstacleMapper {
   LocalObstacleMap map_;
   StepMapper steps_;
   const CorridorFinder corridor_finder_;
+  const GapFinder gap_finder_;
   std::unique_ptr<PathCurvature> curvature_;
   std::unique_ptr<SilentCameras> silent_;
   std::unique_ptr<StandingWatch> standing_;

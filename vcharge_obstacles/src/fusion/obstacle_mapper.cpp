@@ -55,6 +55,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
       map_(options.map),
       steps_(options.vehicle.outline(), options.steps),
       corridor_finder_(options.vehicle.outline(), options.corridor),
+      gap_finder_(options.vehicle),
       curvature_(std::make_unique<PathCurvature>()) {
   cameras_.resize(rig_->cameras.size());
   std::vector<std::string> names = options_.cameras;
@@ -310,9 +311,9 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const StepMapper& steps,
   const double curvature_per_m =
       curvature_->update(frame.map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
   frame.corridor = corridor_finder_.find(frame.map, curvature_per_m, objects);
-  for (const CameraObstacles* camera : cameras) {
-    frame.cameras.push_back(*camera);
-  }
+  frame.gaps = gap_finder_.find(frame.map);
+  std::for_each(cameras.begin(), cameras.end(),
+                [&](const auto* camera) { frame.cameras.push_back(*camera); });
   frame.status = status();
   last_emitted_ = frame.map.stamp;
   num_silent_emitted_ = silent_->numSilentAt(frame.map.stamp);

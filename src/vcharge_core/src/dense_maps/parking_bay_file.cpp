@@ -24,12 +24,11 @@ inline std::vector<std::string> enumNames<BayState>() {
   return {"free", "occupied", "unknown"};
 }
 
-namespace {
-
-template <class Enum>
-std::string nameOf(Enum value) {
-  return enumNames<Enum>().at(static_cast<size_t>(value));
+std::string nameOf(BayState state) {
+  return enumNames<BayState>().at(static_cast<size_t>(state));
 }
+
+namespace {
 
 /// Reads the values of one bay; errors name the file and the bay.
 class BayReader {
@@ -114,9 +113,9 @@ void writeParkingBays(const ParkingBays& bays, const std::string& path) {
     std::snprintf(line.data(), line.size(),
                   "  - {id: %u, row: %u, kind: %s, state: %s, corners_m: [[%.9g, %.9g], [%.9g, %.9g], "
                   "[%.9g, %.9g], [%.9g, %.9g]], entry_sigma_m: %.4g, end_sigma_m: %.4g, confidence: %.3g}\n",
-                  bay.id, bay.row, nameOf(bay.kind).c_str(), nameOf(bay.state).c_str(), c[0].x(), c[0].y(),
-                  c[1].x(), c[1].y(), c[2].x(), c[2].y(), c[3].x(), c[3].y(), bay.entry_sigma_m,
-                  bay.end_sigma_m, bay.confidence);
+                  bay.id, bay.row, enumNames<BayKind>().at(static_cast<size_t>(bay.kind)).c_str(),
+                  nameOf(bay.state).c_str(), c[0].x(), c[0].y(), c[1].x(), c[1].y(), c[2].x(), c[2].y(),
+                  c[3].x(), c[3].y(), bay.entry_sigma_m, bay.end_sigma_m, bay.confidence);
     text += line.data();
   }
   writeTextFileAtomically(path, text);

@@ -1,12 +1,17 @@
-"""Parking bays: how many of those that a drive passes are found, how far their corners are off, and whether they are free."""
+"""Parking bays: how many of those that a drive passes are found, how far their corners are off, and whether they are free; and
+whether a drive on another day tells which of the found ones are free then."""
 import argparse
 
 import cv2
 import numpy as np
 
 import vcharge
-from vcharge_evaluation.drives import CONDITIONS, LOOP_STEP, Drive
+from vcharge_evaluation.drawing.obstacles import read_yaml
+from vcharge_evaluation.drives import CONDITIONS, LOOP_STEP, Drive, condition_words
+from vcharge_evaluation.gaps import gap_figures
+from vcharge_evaluation.living_map import OTHER_DAY
 from vcharge_evaluation.localization_errors import Map
+from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, run_tool, say
 
@@ -22,6 +27,7 @@ def arguments():
     parser.add_argument("--conditions", nargs="*", default=["noon"], choices=CONDITIONS, help="of lots")
     parser.add_argument("--image-scale", type=float, default=0.5)
     parser.add_argument("--duration-s", type=float, default=0.0, help="end the drives early; 0: whole loops")
+    parser.add_argument("--live-s", type=float, default=60.0, help="length of the drives of another day through lots; 0: none")
     return parser.parse_args()
 
 
@@ -70,7 +76,6 @@ def figures(found, true, positions):
     passed = {column for column, bay in enumerate(true) if bay.is_passed(positions)}
     hits = [(found[row], true[column]) for row, column in pairs if column in passed]
     errors = np.array([np.linalg.norm(bay.corners - other.corners, axis=1) for bay, other in hits]).reshape(-1, 4)
-    known = [(bay, other) for bay, other in hits if bay.state != "unknown"]
     normalized = [(bay.corners - other.corners) / bay.sigmas[:, None] for bay, other in hits]
 
     def quantile(values, which):
@@ -85,13 +90,37 @@ def figures(found, true, positions):
         Figure("corners at the entry, 95 %", quantile(errors[:, :2], 95), "cm"),
         Figure("corners, normalized error squared", float(np.mean(np.square(normalized))) if hits else None),
         Figure("kind right", percent(sum(bay.kind == other.kind for bay, other in hits), len(hits)), "%"),
-        figure("free or occupied right, of those known", percent(sum(bay.state == other.state for bay, other in known), len(known)),
-               "%", at_least=98),
-        Figure("free or occupied not known", percent(len(hits) - len(known), len(hits)), "%")]
+        *state_figures(hits)]
+
+
+def state_figures(hits, when=""):
+    """Pairs of found and true bays."""
+    known = [(bay, other) for bay, other in hits if bay.state != "unknown"]
+    return [
+        figure(f"{when}free or occupied right, of those known",
+               percent(sum(bay.state == other.state for bay, other in known), len(known)), "%", at_least=98),
+        Figure(f"{when}free or occupied not known", percent(len(hits) - len(known), len(hits)), "%")]
+
+
+def live_figures(args, scene, seed, mapped, bays):
+    """States of found bays, as a drive on another day tells them that is localized in their map."""
+    drive = Drive(args.work, f"{scene}_bays_live", "--scene", scene, *OTHER_DAY, "--day", 1, "--exchanged-cars", 0.3, "--scene-seed",
+                  seed, "--seed", seed + 100, "--image-scale", args.image_scale, "--duration-s", args.live_s)
+    poses, output = drive.folder / "in_map.tum", drive.folder / "obstacles"
+    say(f"{drive.folder}: which bays are free")
+    run_tool("localize_drive", drive.folder / "in_map.log", "--bag", drive.bag, "--rig", drive.true_rig, "--map", mapped.path,
+             "--options", CONFIG / "localization.yaml", "--output", poses)
+    detect_obstacles(drive, drive.true_rig, output, "--bays", bays, "--trajectory", poses, "--no-objects")
+    found, true = bays_of(output / "bays.yaml", mapped), bays_of(drive.truth / "bays.yaml")
+    positions = vcharge.read_trajectory(drive.trajectory).positions_m[:, :2]
+    hits = [(found[row], true[column]) for row, column in pairs_of(found, true) if true[column].is_passed(positions)]
+    obstacles = read_yaml(drive.truth / "obstacles.yaml")["obstacles"]
+    return [Figure("another day: found bays that the drive passes", len(hits)), *state_figures(hits, "another day: "),
+            *gap_figures(output / "gaps.csv", drive.trajectory, obstacles)]
 
 
 def evaluate(args, scene, seed, condition):
-    words = ("--set", f"condition.kind={condition}") if condition != "noon" else ()
+    words = condition_words(condition)
     drive = Drive(args.work, f"{scene}_bays", "--scene", scene, "--drive", "loop", "--scene-seed", seed, "--seed", seed,
                   "--image-scale", args.image_scale, "--image-step", LOOP_STEP,
                   *(["--duration-s", args.duration_s] if args.duration_s else []), *words)
@@ -101,9 +130,12 @@ def evaluate(args, scene, seed, condition):
              trajectory, "--options", CONFIG / "height_map.yaml", "--output", drive.folder / "height_map")
     made = run_tool("map_bays", drive.folder / "bays.log", "--height-map", drive.folder / "height_map", "--output",
                     drive.folder / "bays.yaml")
-    found = bays_of(drive.folder / "bays.yaml", Map(path, drive.trajectory))
+    mapped = Map(path, drive.trajectory)
+    found = bays_of(drive.folder / "bays.yaml", mapped)
+    live = scene == "lot" and condition == "noon" and args.live_s > 0
     return [*figures(found, bays_of(drive.truth / "bays.yaml"), vcharge.read_trajectory(drive.trajectory).positions_m[:, :2]),
-            Figure("time", made.wall_s, "s")]
+            Figure("time", made.wall_s, "s"),
+            *(live_figures(args, scene, seed, mapped, drive.folder / "bays.yaml") if live else [])]
 
 
 def main():

@@ -39,6 +39,14 @@ struct VehicleFootprint {
   double minTurningRadius_m() const {
     return std::sqrt(0.25 * turning_circle_m * turning_circle_m - wheelbase_m * wheelbase_m) - 0.5 * width_m;
   }
+  /// Shortest gap between two parked vehicles that the vehicle leaves forwards in one move. It stands at the
+  /// one behind and in line with the one ahead, whose near corner its own front corner, on the far side, just
+  /// passes on the narrowest circle: in that circle's centre, front_m^2 + (r + w / 2)^2 = x^2 + (r - w /
+  /// 2)^2.
+  double minParallelGap_m() const {
+    const double front_m = outline().front_m;
+    return rear_overhang_m + std::sqrt(front_m * front_m + 2.0 * minTurningRadius_m() * width_m);
+  }
 };
 
 }  // namespace vcharge
