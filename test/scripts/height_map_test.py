@@ -122,6 +122,19 @@ class HeightMapTest(unittest.TestCase):
         run_tool([*words, again])
         self.assertEqual(again.read_bytes(), path.read_bytes())
 
+        lanelets, back = self.drive.folder / "bays.osm", self.drive.folder / "back.yaml"
+        convert = [tool("vcharge_dense", "convert_bays"), "--datum", "48.4", "10.9"]
+        for source, target in ((path, lanelets), (lanelets, back)):
+            status, found, errors = run_tool([*convert, "--input", source, "--output", target])
+            self.assertEqual((status, errors, found["num_bays"]), (0, [], 5))
+        read = yaml.safe_load(back.read_text())
+        for bay, other in zip(read["bays"], content["bays"]):
+            np.testing.assert_allclose(bay.pop("corners_m"), other.pop("corners_m"), atol=1e-5)
+            self.assertEqual(bay, other)
+        status, _, errors = run_tool([*convert, "--input", path, "--output", self.drive.folder / "no.yaml"])
+        self.assertEqual((status, len(errors)), (1, 1))
+        self.assertIn("no.yaml: expected a name that ends in .osm", errors[0])
+
     def test_a_map_without_paint_has_no_bays(self):
         status, found, _ = run_tool([tool("vcharge_dense", "map_bays"), "--height-map", self.saved, "--output",
                                      self.drive.folder / "none.yaml"])
