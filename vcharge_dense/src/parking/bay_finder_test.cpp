@@ -1,5 +1,6 @@
 #include "vcharge_dense/bay_finder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -31,6 +32,8 @@ class CarPark {
   }
   /// A car of 4 m by 1.8 m, with unseen ground around it.
   void car(const Eigen::Vector2d& middle_m, double hidden_m = 0.1) { cars_.push_back({middle_m, hidden_m}); }
+  /// Ground that is higher by a kerb.
+  void kerb(const Eigen::AlignedBox2d& area) { kerbs_.push_back(area); }
   /// Cells that are not seen.
   void hide(const Eigen::AlignedBox2d& area) { hidden_.push_back(area); }
   /// Gray levels of ground and paint, and of the texture of the ground.
@@ -91,7 +94,9 @@ class CarPark {
         return std::numeric_limits<double>::quiet_NaN();
       }
     }
-    return 0.0;
+    return std::any_of(kerbs_.begin(), kerbs_.end(), [&](const auto& kerb) { return kerb.contains(at_m); })
+               ? 0.08
+               : 0.0;
   }
 
   double coverageAt(const Eigen::Vector2d& centre_m, double cell_m) const {
@@ -110,7 +115,7 @@ class CarPark {
   Eigen::Rotation2Dd map_from_park_;
   std::vector<Line> lines_;
   std::vector<Car> cars_;
-  std::vector<Eigen::AlignedBox2d> hidden_;
+  std::vector<Eigen::AlignedBox2d> hidden_, kerbs_;
   double ground_ = 90.0, paint_ = 170.0, texture_ = 4.0, light_ratio_ = 1.0;
 };
 
@@ -203,6 +208,20 @@ TEST(BayFinderTest, FindsWornPaintInUnevenLight) {
   park.row({-7.8, 2.0}, 2.6, {0.0, 4.8}, 6);
   const ParkingBays bays = findBays(park.map());
   EXPECT_EQ(bays.bays.size(), 6U);
+}
+
+TEST(BayFinderTest, EndsBaysAtTheKerb) {
+  CarPark park(0.3);
+  park.row({-6.5, 2.0}, 2.6, {0.0, 4.2}, 5);
+  park.kerb({Eigen::Vector2d(-16.0, 6.2), Eigen::Vector2d(16.0, 16.0)});
+  park.car({0.0, 4.1});
+  park.hide({Eigen::Vector2d(1.5, 3.0), Eigen::Vector2d(6.4, 6.7)});
+  const ParkingBays bays = findBays(park.map());
+  ASSERT_EQ(bays.bays.size(), 5U);
+  for (const ParkingBay& bay : bays.bays) {
+    EXPECT_NEAR((bay.corners_m[3] - bay.corners_m[0]).norm(), 4.2, 0.12);
+    EXPECT_LT(bay.end_sigma_m, 0.1);
+  }
 }
 
 TEST(BayFinderTest, FindsNoBaysInOtherMarkingsOrWithoutAny) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -20,8 +21,7 @@ constexpr int kMostHidden = 4;             // dividers side by side
 /// Makes rows of the lattices of one kind.
 class RowMaker {
  public:
-  RowMaker(const GroundImage& ground, const std::vector<PaintLine>& lines, const BaySizes& sizes)
-      : ground_(ground), lines_(lines), sizes_(sizes) {}
+  RowMaker(const GroundImage& ground, const BaySizes& sizes) : ground_(ground), sizes_(sizes) {}
 
   void addRows(const LatticeSearch& search, const FoundLattice& found, std::vector<BayRow>* rows) const {
     BayLattice lattice = found.lattice;
@@ -35,7 +35,8 @@ class RowMaker {
         seen.push_back(number);
       }
     }
-    const DividerExtent extent = extentOf(ground_, lattice, seen, paleContrast(found.lines), sizes_);
+    const double pale_contrast = paleContrast(found.lines);
+    DividerExtent extent = extentOf(ground_, lattice, seen, pale_contrast, sizes_);
     lattice.entry_m += extent.begin_m * lattice.into;
     const Eigen::Vector2d depth_m = extent.length_m() * lattice.into;
     if (extent.length_m() <= sizes_.max_length &&
@@ -44,6 +45,8 @@ class RowMaker {
       // The lane is at the other ends.
       lattice.entry_m += depth_m;
       lattice.into = -lattice.into;
+      extent = extentOf(ground_, lattice, seen, pale_contrast, sizes_);
+      lattice.entry_m += extent.begin_m * lattice.into;
     }
     std::vector<BayDivider> together;
     for (int number = first; number <= last; ++number) {
@@ -101,22 +104,39 @@ class RowMaker {
 
   /// Whether a car stands in the bay after a divider.
   bool isCarAfter(const BayLattice& lattice, int number) const {
-    constexpr double kMinHeight_m = 0.4, kMaxHeight_m = 2.5, kMinRaised = 0.15, kMaxGround = 0.3;
-    constexpr int kSamples = 10;  // in width and length
-    const float ground_m = ground_.height_m(lattice.entryOf(number) - lattice.into);
+    constexpr double kMinHeight_m = 0.4, kMaxHeight_m = 2.5, kMinRaised_m2 = 0.6, kMaxGround = 0.5;
+    constexpr int kSamples = 40;  // in width and length
+    const double sample_m2 = lattice.width_m() * sizes_.min_length / (kSamples * kSamples);
+    const double ground_m = groundBeside(lattice, number);
     int count = 0, num_raised = 0, num_ground = 0;
-    for (int side = 2; side < kSamples - 1; ++side) {
+    for (int side = kSamples / 5; side < kSamples - kSamples / 10; ++side) {
       for (int in = 0; in < kSamples; ++in) {
         const Eigen::Vector2d position_m =
             lattice.entryOf(number) +
             (side * lattice.step_m + in * sizes_.min_length * lattice.into) / static_cast<double>(kSamples);
-        const float height_m = ground_.height_m(position_m) - ground_m;
+        const double height_m = ground_.height_m(position_m) - ground_m;
         ++count;
         num_raised += height_m > kMinHeight_m && height_m < kMaxHeight_m ? 1 : 0;
         num_ground += ground_.at(position_m) ? 1 : 0;
       }
     }
-    return num_raised >= kMinRaised * count && num_ground <= kMaxGround * count;
+    return num_raised * sample_m2 >= kMinRaised_m2 && num_ground <= kMaxGround * count;
+  }
+
+  /// Height of the ground along both dividers of the bay after a divider, and beyond their ends. NaN if none
+  /// is seen.
+  double groundBeside(const BayLattice& lattice, int number) const {
+    constexpr double kBeyond_m = 1.0;
+    std::vector<double> heights_m;
+    for (double at_m = -kBeyond_m; at_m < sizes_.min_length + kBeyond_m; at_m += ground_.cellSize_m()) {
+      for (const int side : {number, number + 1}) {
+        const Eigen::Vector2d position_m = lattice.entryOf(side) + at_m * lattice.into;
+        if (ground_.at(position_m)) {
+          heights_m.push_back(ground_.height_m(position_m));
+        }
+      }
+    }
+    return heights_m.empty() ? std::numeric_limits<double>::quiet_NaN() : quantile(std::move(heights_m), 0.5);
   }
 
   /// Whether the place after a divider is level and higher than the lane by a kerb.
@@ -155,39 +175,86 @@ class RowMaker {
     return count;
   }
 
-  /// Whether a painted line runs along a side of the bay after a divider, at the lane or at the other end.
-  bool hasLongSide(const BayLattice& lattice, int number) const {
-    constexpr double kMinPart = 0.4;  // of the side
-    const Eigen::Vector2d entry_m = lattice.entryOf(number), along = lattice.step_m.normalized();
-    const double length_m = lattice.step_m.norm();
-    return std::any_of(lines_.begin(), lines_.end(), [&](const PaintLine& line) {
-      const auto [from_m, to_m] =
-          std::minmax({along.dot(line.from_m - entry_m), along.dot(line.to_m - entry_m)});
-      const double beside_m = std::min(length_m, to_m) - std::max(0.0, from_m);
-      const double into_m = std::abs(rightOf(along).dot(line.from_m - entry_m));
-      return std::abs(along.dot(line.direction())) > kSameDirection && beside_m > kMinPart * length_m &&
-             (into_m < kEntryTolerance_m ||
-              (into_m > sizes_.min_length && into_m < sizes_.max_length + kEntryTolerance_m));
-    });
+  /// A painted line that joins the dividers of a row at one of their ends.
+  struct JoiningLine {
+    double offset_m = 0.0;  ///< from the ends along the dividers, at the first divider
+    double slope_m = 0.0;   ///< increase of the offset per bay
+    double contrast = 0.0;  ///< sum over the bays
+    size_t num_bays = 0;    ///< in which it is seen
+  };
+
+  /// Contrast of a line across a bay. Nothing if little of it is seen.
+  std::optional<double> contrastOf(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m) const {
+    constexpr double kMinPart = 0.4;
+    const double length_m = (to_m - from_m).norm(), cell_m = ground_.cellSize_m();
+    const Eigen::Vector2d along = (to_m - from_m) / length_m;
+    std::vector<double> contrasts;
+    for (double at_m = 0.0; at_m < length_m; at_m += cell_m) {
+      const auto seen = ground_.lineContrast(from_m + at_m * along, rightOf(along));
+      if (seen && seen->to_left && seen->to_right) {
+        contrasts.push_back(seen->smaller());
+      }
+    }
+    return static_cast<double>(contrasts.size()) * cell_m > kMinPart * length_m
+               ? std::optional(quantile(std::move(contrasts), 0.5))
+               : std::nullopt;
   }
 
-  /// Whether there is a row, and not other markings.
-  bool isRow(const BayLattice& lattice, int first, const std::vector<BayDivider>& dividers) const {
-    const auto num_seen = std::count_if(dividers.begin(), dividers.end(),
-                                        [](const BayDivider& divider) { return divider.is_seen; });
-    if (num_seen < kMinSeen) {
+  /// The clearest line near the ends of the dividers `at_m` along them. It may be too worn to be found
+  /// without knowing where it is, and it tells the direction of a row better than short dividers. Its slope
+  /// is within `max_slope_m` of `slope_m`.
+  JoiningLine joiningLine(const BayRow& row, double at_m, double slope_m, double max_slope_m) const {
+    constexpr double kReach_m = 0.35, kSlopeStep_m = 0.03;
+    constexpr double kLeastContrast = 0.03;  // medians along bare ground are within 0.01
+    const Eigen::Vector2d into = row.depth_m.normalized();
+    const int offsets = static_cast<int>(std::lround(kReach_m / ground_.cellSize_m()));
+    const int slopes = static_cast<int>(std::lround(max_slope_m / kSlopeStep_m));
+    JoiningLine best;
+    for (int slope = -slopes; slope <= slopes; ++slope) {
+      for (int offset = -offsets; offset <= offsets; ++offset) {
+        JoiningLine line{offset * ground_.cellSize_m(), slope_m + slope * kSlopeStep_m, 0.0, 0};
+        for (size_t i = 0; i + 1 < row.dividers.size(); ++i) {
+          const Eigen::Vector2d from_m = row.entry_m + (at_m + line.offset_m) * into +
+                                         static_cast<double>(i) * (row.step_m + line.slope_m * into);
+          const auto contrast = contrastOf(from_m, from_m + row.step_m + line.slope_m * into);
+          if (contrast && *contrast > kLeastContrast) {
+            line.contrast += *contrast;
+            ++line.num_bays;
+          }
+        }
+        if (line.contrast > best.contrast) {
+          best = line;
+        }
+      }
+    }
+    return best;
+  }
+
+  /// Moves a row of bays along the lane to the lines that join its dividers at the entry and at the end.
+  /// False if neither is seen along half of the row: the dashes of a lane look like dividers.
+  bool moveToJoiningLines(BayRow* row) const {
+    constexpr double kMostTurn = 0.05;  // radians
+    const double max_slope_m = kMostTurn * row->step_m.norm(), length_m = row->depth_m.norm();
+    JoiningLine entry = joiningLine(*row, 0.0, 0.0, max_slope_m);
+    JoiningLine end = joiningLine(*row, length_m, 0.0, max_slope_m);
+    const double slope_m = entry.contrast >= end.contrast ? entry.slope_m : end.slope_m;
+    entry = joiningLine(*row, 0.0, slope_m, 0.0);
+    end = joiningLine(*row, length_m, slope_m, 0.0);
+    const size_t num_bays = row->dividers.size() - 1;
+    if (2 * std::max(entry.num_bays, end.num_bays) < num_bays) {
       return false;
     }
-    if (!sizes_.areParallelToLane()) {
-      return true;
+    const Eigen::Vector2d into = row->depth_m.normalized();
+    row->entry_m += entry.offset_m * into;
+    row->step_m += slope_m * into;
+    const Eigen::Vector2d across = rightOf(row->step_m.normalized());
+    row->depth_m =
+        (length_m + end.offset_m - entry.offset_m) * (across.dot(into) > 0.0 ? 1.0 : -1.0) * across;
+    if (2 * end.num_bays >= num_bays) {
+      row->is_end_seen = true;
+      row->end_sigma_m = row->entry_sigma_m;
     }
-    // The dashes of a lane look like dividers of parallel bays, but no line joins them.
-    const int num_bays = static_cast<int>(dividers.size()) - 1;
-    int num_sides = 0;
-    for (int i = 0; i < num_bays; ++i) {
-      num_sides += hasLongSide(lattice, first + i) ? 1 : 0;
-    }
-    return 2 * num_sides >= num_bays;
+    return true;
   }
 
   void addRow(const BayLattice& lattice, const DividerExtent& extent, int first,
@@ -206,7 +273,9 @@ class RowMaker {
       row.dividers.erase(row.dividers.begin());
       ++first;
     }
-    if (!isRow(lattice, first, row.dividers)) {
+    const auto num_seen = std::count_if(row.dividers.begin(), row.dividers.end(),
+                                        [](const BayDivider& divider) { return divider.is_seen; });
+    if (num_seen < kMinSeen) {
       return;
     }
     constexpr double kRightAngle_sine = 0.966;  // 75 degrees
@@ -220,6 +289,9 @@ class RowMaker {
     row.is_end_seen = extent.is_end_seen;
     row.entry_sigma_m = kEntrySigma_m;
     row.end_sigma_m = std::hypot(kEntrySigma_m, extent.end_sigma_m);
+    if (sizes_.areParallelToLane() && !moveToJoiningLines(&row)) {
+      return;
+    }
     rows->push_back(row);
     if (is_double) {  // two rows back to back
       row.entry_m += extent.length_m() * lattice.into;
@@ -229,7 +301,6 @@ class RowMaker {
   }
 
   const GroundImage& ground_;
-  const std::vector<PaintLine>& lines_;
   const BaySizes sizes_;
 };
 
@@ -270,7 +341,7 @@ std::vector<BayRow> findBayRows(const GroundImage& ground, const std::vector<Pai
   std::vector<BayRow> rows;
   for (const BaySizes& sizes : {kBaysAcross, kBaysAlong}) {
     LatticeSearch search(ground, lines, sizes, &is_used);
-    const RowMaker maker(ground, lines, sizes);
+    const RowMaker maker(ground, sizes);
     while (const std::optional<FoundLattice> found = search.next()) {
       const auto num_known = static_cast<std::ptrdiff_t>(rows.size());
       maker.addRows(search, *found, &rows);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -12,6 +14,7 @@ namespace {
 
 // Across a line, which is known to some centimetres only.
 constexpr std::array<double, 3> kOffsets_m{0.0, -0.05, 0.05};
+constexpr size_t kMinDividers = 2;                     // that agree on where lines end
 constexpr double kPaintRatio = 0.5, kBareRatio = 0.3;  // contrast over that of a line
 
 /// Contrast of the paint at a place of a line. Nothing unless both sides are seen.
@@ -25,6 +28,55 @@ std::optional<double> contrastNear(const GroundImage& ground, const Eigen::Vecto
     }
   }
   return best;
+}
+
+/// Where the surface rises along most dividers after a place of them: at a kerb or a wall, to which lines are
+/// painted. The foot of a wall is round in a height map, hence where half of the height is reached.
+std::optional<double> riseAfter(const GroundImage& ground, const BayLattice& lattice,
+                                const std::vector<int>& numbers, double from_m) {
+  constexpr double kReach_m = 0.7, kLeastStep_m = 0.05, kHighest_m = 0.4;
+  const int steps = static_cast<int>(std::lround(kReach_m / ground.cellSize_m()));
+  std::vector<double> rises_m;
+  size_t num_level = 0;
+  for (const int number : numbers) {
+    std::vector<double> heights_m;  // over that at the place
+    double first_m = std::numeric_limits<double>::quiet_NaN();
+    for (int i = 0; i <= steps; ++i) {
+      const Eigen::Vector2d at_m =
+          lattice.entryOf(number) + (from_m + i * ground.cellSize_m()) * lattice.into;
+      const double height_m = ground.height_m(at_m);
+      heights_m.push_back(height_m - (heights_m.empty() ? height_m : first_m));
+      first_m = heights_m.size() == 1 ? height_m : first_m;
+    }
+    double top_m = 0.0;
+    for (const double height_m : heights_m) {
+      top_m = std::isfinite(height_m) ? std::max(top_m, std::min(height_m, kHighest_m)) : top_m;
+    }
+    const auto half = std::find_if(heights_m.begin(), heights_m.end(),
+                                   [&](double height_m) { return height_m >= 0.5 * top_m; });
+    if (top_m >= kLeastStep_m) {
+      rises_m.push_back(from_m + static_cast<double>(half - heights_m.begin()) * ground.cellSize_m());
+    } else if (std::isfinite(first_m)) {
+      ++num_level;
+    }
+  }
+  return rises_m.size() >= kMinDividers && rises_m.size() > num_level
+             ? std::optional(quantile(std::move(rises_m), 0.5))
+             : std::nullopt;
+}
+
+/// Contrasts of the dividers at one place along them, where both sides are seen, in ascending order.
+std::vector<double> contrastsAt(const GroundImage& ground, const BayLattice& lattice,
+                                const std::vector<int>& numbers, double along_m) {
+  std::vector<double> contrasts;
+  for (const int number : numbers) {
+    if (const auto found =
+            contrastNear(ground, lattice.entryOf(number) + along_m * lattice.into, rightOf(lattice.into))) {
+      contrasts.push_back(*found);
+    }
+  }
+  std::sort(contrasts.begin(), contrasts.end());
+  return contrasts;
 }
 
 }  // namespace
@@ -62,23 +114,21 @@ DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, con
                        double line_contrast, const BaySizes& sizes) {
   constexpr double kBefore_m = 2.0, kMinContrast = 0.02, kBareRun_m = 0.3, kUnseenRun_m = 0.5;
   constexpr double kSeenSigma_m = 0.06;
-  constexpr size_t kMinDividers = 2;
   const double step_m = ground.cellSize_m();
   const double least = std::max(kMinContrast, kBareRatio * line_contrast);
-  const Eigen::Vector2d across = rightOf(lattice.into);
+  // Where few of the dividers are still seen, they may belong to another row behind this one.
+  size_t most_seen = 0;
+  for (double along_m = 0.0; along_m < sizes.min_length; along_m += kUnseenRun_m) {
+    most_seen = std::max(most_seen, contrastsAt(ground, lattice, numbers, along_m).size());
+  }
+  const size_t least_seen = std::max(kMinDividers, (most_seen + 3) / 4);
   enum class Seen { kPaint, kBare, kNothing };
   const auto seenAt = [&](double along_m) {
-    std::vector<double> contrasts;
-    for (const int number : numbers) {
-      if (const auto found = contrastNear(ground, lattice.entryOf(number) + along_m * lattice.into, across)) {
-        contrasts.push_back(*found);
-      }
-    }
-    if (contrasts.size() < kMinDividers) {
+    const std::vector<double> contrasts = contrastsAt(ground, lattice, numbers, along_m);
+    if (contrasts.size() < least_seen) {
       return Seen::kNothing;
     }
     // The lower median: another marking may prolong one line.
-    std::sort(contrasts.begin(), contrasts.end());
     return contrasts[(contrasts.size() - 1) / 2] >= least ? Seen::kPaint : Seen::kBare;
   };
   // The last painted place before the ground is bare, or nothing is seen; the start if none is painted.
@@ -110,6 +160,10 @@ DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, con
     extent.begin_m = 0.0;
   }
   extent.end_m = walk(inside_m, 2.0 * sizes.max_length, &extent.is_end_seen) + 0.5 * step_m;
+  if (const auto rise_m = riseAfter(ground, lattice, numbers, extent.end_m - 0.5 * step_m)) {
+    extent.end_m = *rise_m;
+    extent.is_end_seen = true;
+  }
   extent.is_end_seen = extent.is_end_seen && extent.length_m() >= sizes.min_length;
   extent.end_sigma_m = kSeenSigma_m;
   if (!extent.is_end_seen) {

@@ -88,15 +88,19 @@ void LatticeSearch::eraseWrong(FoundLattice* found) const {
   }
 }
 
-double LatticeSearch::checkedScore(const FoundLattice& found) const {
+LatticeSearch::Score LatticeSearch::checkedScore(const FoundLattice& found) const {
+  constexpr double kHidden = 0.3;  // a row through what is seen of one row is better than one through several
   const double contrast = paleContrast(found.lines);
-  double score = scoreOf(found.lattice, found.lines);
+  Score score{scoreOf(found.lattice, found.lines), 0.0};
+  int num_hidden = 0;
   for (int number = found.lines.begin()->first; number < found.lines.rbegin()->first; ++number) {
     if (found.lines.count(number) == 0) {
       const DividerPaint paint = paintOf(found, number, contrast);
-      score += paint.isLine() ? kNotAtLane : paint.isUnclear() ? 0.0 : -1.0;
+      score.seen += paint.isLine() ? kNotAtLane : paint.isUnclear() ? 0.0 : -1.0;
+      num_hidden += paint.isUnclear() && !paint.isLine() ? 1 : 0;
     }
   }
+  score.rank = score.seen - kHidden * num_hidden;
   return score;
 }
 
@@ -109,7 +113,7 @@ std::optional<FoundLattice> LatticeSearch::next() {
   std::stable_sort(guessed.begin(), guessed.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::optional<FoundLattice> best;
-  double best_score = kLeastScore;
+  double best_rank = 0.0;
   for (auto guess = guessed.begin(); guess != checked_end; ++guess) {
     FoundLattice found{guess->second, linesOn(guess->second, lines_, is_used_, sizes_, kStepError)};
     for (int round = 0; round < 3 && found.lines.size() >= 2; ++round) {
@@ -120,8 +124,9 @@ std::optional<FoundLattice> LatticeSearch::next() {
     if (found.lines.size() < 2 || !isPossible(found.lattice)) {
       continue;
     }
-    if (const double score = checkedScore(found); score > best_score) {
-      best_score = score;
+    const Score score = checkedScore(found);
+    if (score.seen > kLeastScore && (!best || score.rank > best_rank)) {
+      best_rank = score.rank;
       best = std::move(found);
     }
   }

@@ -31,10 +31,15 @@ class LatticeSearch {
   DividerPaint paintOf(const FoundLattice& found, int number, double contrast) const;
 
  private:
+  struct Score {
+    double seen;  ///< number of lines that are seen, less those that should be
+    double rank;  ///< less hidden ones too
+  };
+
   bool isPossible(const BayLattice& lattice) const;
   std::vector<std::pair<double, BayLattice>> guesses() const;
   void eraseWrong(FoundLattice* found) const;
-  double checkedScore(const FoundLattice& found) const;
+  Score checkedScore(const FoundLattice& found) const;
 
   const GroundImage& ground_;
   const BaySizes sizes_;

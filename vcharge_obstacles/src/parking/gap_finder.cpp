@@ -13,7 +13,7 @@ namespace {
 constexpr double kBack_m = 9.0, kAhead_m = 6.0;  // limits of the search, from the rear axle
 constexpr double kBeside_m = 0.1;                // from the vehicle's side to the first place looked at
 constexpr double kReach_m = 7.0;                 // from the vehicle's side
-constexpr double kMaxFlank_m = 3.0;    // from the vehicle's side to the nearest sides of parked cars
+constexpr double kMaxFlank_m = 4.5;    // from the vehicle's side to the nearest sides of parked cars
 constexpr double kDoor_m = 0.35;       // to open a door on one side
 constexpr double kMargin_m = 0.2;      // in depth
 constexpr double kLane_m = 5.0;        // width from which a deep gap may be a lane
