@@ -2,9 +2,9 @@
 # Measures a stage: simulates drives (or uses those of an earlier run in --work), runs the tools, and judges the results.
 #   evaluate.sh STAGE [arguments; --help]
 # STAGE: masks, calibration, monitor (a rig watched), mapping, living_map (over days), pose_graphs (false loops), localization,
-# shutters (rolling, and clocks), ranges, height_map, bays, obstacles, standing (five minutes), steps (kerbs, holes), objects (moving),
-# conditions, faults, odometry (a real car's CAN), images (beside real ones), chain (all stages from unknown cameras), online (the nodelets live),
-# soak (their memory).
+# shutters (rolling, and clocks), ranges, height_map, bays, surround_view (from above), obstacles, standing (five minutes), steps (kerbs,
+# holes), objects (moving), conditions, faults, odometry (a real car's CAN), images (beside real ones), chain (all stages from unknown
+# cameras), online (the nodelets live), soak (their memory).
 # --publish puts the figures into doc/results and doc/results.md.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -314,8 +314,8 @@ class BaysTest(unittest.TestCase):
 
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
-        for stage in ("masks", "calibration", "mapping", "localization", "living_map", "ranges", "height_map", "bays", "obstacles",
-                      "objects", "conditions", "faults", "chain", "online", "soak"):
+        for stage in ("masks", "calibration", "mapping", "localization", "living_map", "ranges", "height_map", "bays", "surround_view",
+                      "obstacles", "objects", "conditions", "faults", "chain", "online", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)
             sys.argv = ["evaluate.sh", stage, "--help"]

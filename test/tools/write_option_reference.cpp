@@ -17,6 +17,7 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_dense/height_map_options.h"
 #include "vcharge_dense/range_mapper.h"
+#include "vcharge_dense/surround_view.h"
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_mapping/map_summary.h"
 #include "vcharge_mapping/map_updater.h"
@@ -76,6 +77,8 @@ int main() {
                                               "`object_nodelet`; `detect_obstacles` uses the defaults.");
   writeSection<vcharge::ObstacleMapperOptions>(
       "Obstacle map", "`detect_obstacles`, `obstacle_nodelet`: `config/obstacles.yaml`.");
+  writeSection<vcharge::SurroundViewOptions>("Surround view",
+                                             "`render_surround_view`, `surround_view_nodelet`.");
   writeSection<vcharge::DriveScenario>("Simulated drive", "`simulate_drive`: `config/scenarios/`.");
   return 0;
 }

@@ -12,11 +12,11 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "bay_messages.h"
-#include "obstacle_messages.h"
 #include "vcharge_core/dense_maps/parking_bay_file.h"
 #include "vcharge_obstacles/bay_monitor.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/nodelet.h"
+#include "vcharge_ros/obstacle_conversions.h"
 
 namespace vcharge {
 

@@ -13,7 +13,7 @@
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
-#include "vcharge_ros/object_conversions.h"
+#include "vcharge_ros/obstacle_conversions.h"
 
 namespace vcharge {
 

@@ -10,11 +10,10 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "object_markers.h"
-#include "obstacle_messages.h"
 #include "vcharge_core/workers/ordered_worker.h"
 #include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_ros/nodelet.h"
-#include "vcharge_ros/object_conversions.h"
+#include "vcharge_ros/obstacle_conversions.h"
 #include "vcharge_ros/stage_schedule.h"
 
 namespace vcharge {

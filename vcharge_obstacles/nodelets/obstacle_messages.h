@@ -4,12 +4,10 @@
 #include <string>
 
 #include <geometry_msgs/Vector3Stamped.h>
-#include <nav_msgs/OccupancyGrid.h>
 #include <sensor_msgs/LaserScan.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "vcharge_core/dense_maps/obstacle_map.h"
-#include "vcharge_core/dense_maps/step_map.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_ros/drive_monitor.h"
 
@@ -18,17 +16,6 @@ class OcTree;
 }
 
 namespace vcharge {
-
-/// Cells: -1 unobserved, 0 free, 100 occupied. frame_id and stamp are the map's.
-nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map);
-
-/// The states of the cells; pose, heights, points and ages are unknown. InputError that names the topic
-/// unless the grid has a stamp, a frame, a resolution, an origin without rotation, and as many cells as it
-/// says.
-ObstacleMap fromMessage(const nav_msgs::OccupancyGrid& grid, const std::string& topic);
-
-/// Cells: -1 unknown, 0 even, 100 step. frame_id and stamp are the map's.
-nav_msgs::OccupancyGrid toMessage(const StepMap& map);
 
 /// Ranges to obstacles in metres; +infinity where all is free up to the maximum range; NaN where unknown.
 /// Intensities: height of the obstacle in metres, 0 without one. `frame_id` lies at the scan's origin on the

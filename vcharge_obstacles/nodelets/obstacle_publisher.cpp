@@ -8,6 +8,7 @@
 #include "corridor_messages.h"
 #include "obstacle_messages.h"
 #include "vcharge_ros/conversions.h"
+#include "vcharge_ros/obstacle_conversions.h"
 #include "vcharge_ros/octomap_conversions.h"
 
 namespace vcharge {

@@ -14,6 +14,7 @@ STAGES = {
     "ranges": "ranges",
     "height_map": "height_map",
     "bays": "bays",
+    "surround_view": "surround_view",
     "obstacles": "obstacles",
     "objects": "objects",
     "standing": "standing",

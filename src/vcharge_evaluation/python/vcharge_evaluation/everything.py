@@ -60,6 +60,8 @@ def steps():
                        [*words, "--image-scale", QUICK_SCALE, "--consistency", 5] if first else None)
     yield Step("bays", ["--drives", *(f"lot:{seed}" for seed in LOTS), *(f"garage:{seed}" for seed in GARAGES), "--conditions",
                         *CONDITIONS])
+    yield Step("surround_view", ["--drives", *(f"lot:short:{seed}" for seed in LOTS), *(f"garage:short:{seed}" for seed in GARAGES),
+                                 f"obstacles:creep:{LOTS[0]}"])
     yield Step("standing", ["--seeds", LOTS[0]])
     yield Step("steps", ["--seeds", *LOTS])
     # The quick run's drives are those of its conditions.

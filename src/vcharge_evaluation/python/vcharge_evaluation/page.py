@@ -8,7 +8,7 @@ from vcharge_evaluation.tools import ROOT
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
 ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "living_map", "shutters", "ranges",
-         "height_map", "bays", "obstacles", "standing", "steps", "objects", "faults", "odometry", "images", "online", "real_images", "foundations",
+         "height_map", "bays", "surround_view", "obstacles", "standing", "steps", "objects", "faults", "odometry", "images", "online", "real_images", "foundations",
          "speed")
 INTRODUCTION = """# Results
 

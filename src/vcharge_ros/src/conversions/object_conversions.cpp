@@ -1,4 +1,4 @@
-#include "vcharge_ros/object_conversions.h"
+#include "vcharge_ros/obstacle_conversions.h"
 
 #include <cmath>
 
