@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "vcharge_core/base/quantile.h"
@@ -30,39 +31,74 @@ std::optional<double> contrastNear(const GroundImage& ground, const Eigen::Vecto
   return best;
 }
 
-/// Where the surface rises along most dividers after a place of them: at a kerb or a wall, to which lines are
-/// painted. The foot of a wall is round in a height map, hence where half of the height is reached.
-std::optional<double> riseAfter(const GroundImage& ground, const BayLattice& lattice,
-                                const std::vector<int>& numbers, double from_m) {
-  constexpr double kReach_m = 0.7, kLeastStep_m = 0.05, kHighest_m = 0.4;
-  const int steps = static_cast<int>(std::lround(kReach_m / ground.cellSize_m()));
-  std::vector<double> rises_m;
-  size_t num_level = 0;
-  for (const int number : numbers) {
-    std::vector<double> heights_m;  // over that at the place
-    double first_m = std::numeric_limits<double>::quiet_NaN();
-    for (int i = 0; i <= steps; ++i) {
-      const Eigen::Vector2d at_m =
-          lattice.entryOf(number) + (from_m + i * ground.cellSize_m()) * lattice.into;
-      const double height_m = ground.height_m(at_m);
-      heights_m.push_back(height_m - (heights_m.empty() ? height_m : first_m));
-      first_m = heights_m.size() == 1 ? height_m : first_m;
-    }
+/// A kerb, a hedge or a wall, in metres along the dividers.
+struct Rise {
+  double begin_m, half_m;  ///< where it begins, and where half of its height is reached
+};
+
+/// The first rise of the surface above the ground in a row of cells, as indices. Nothing if the surface
+/// remains level, or is not seen before it rises; the latter sets `is_unknown`.
+std::optional<std::pair<size_t, size_t>> firstRise(const std::vector<double>& heights_m, double cell_m,
+                                                   bool* is_unknown) {
+  constexpr double kStep_m = 0.05, kRun_m = 0.3, kTopRun_m = 0.7, kHighest_m = 0.4, kGap_m = 0.2;
+  const auto cells = [&](double length_m) { return static_cast<size_t>(std::lround(length_m / cell_m)); };
+  const auto topAfter = [&](size_t begin, double run_m) {
     double top_m = 0.0;
-    for (const double height_m : heights_m) {
-      top_m = std::isfinite(height_m) ? std::max(top_m, std::min(height_m, kHighest_m)) : top_m;
+    for (size_t i = begin; i < std::min(heights_m.size(), begin + cells(run_m) + 1); ++i) {
+      top_m = std::isfinite(heights_m[i]) ? std::max(top_m, heights_m[i] - heights_m[begin]) : top_m;
     }
-    const auto half = std::find_if(heights_m.begin(), heights_m.end(),
-                                   [&](double height_m) { return height_m >= 0.5 * top_m; });
-    if (top_m >= kLeastStep_m) {
-      rises_m.push_back(from_m + static_cast<double>(half - heights_m.begin()) * ground.cellSize_m());
-    } else if (std::isfinite(first_m)) {
-      ++num_level;
+    return std::min(top_m, kHighest_m);
+  };
+  size_t num_unseen = 0;
+  for (size_t i = 0; i < heights_m.size(); ++i) {
+    num_unseen = std::isfinite(heights_m[i]) ? 0 : num_unseen + 1;
+    *is_unknown = num_unseen > cells(kGap_m);
+    if (*is_unknown) {
+      return std::nullopt;
+    }
+    if (num_unseen == 0 && topAfter(i, kRun_m) >= kStep_m) {
+      const double half_m = 0.5 * topAfter(i, kTopRun_m);
+      size_t half = i;
+      while (!(heights_m[half] - heights_m[i] >= half_m)) {
+        ++half;
+      }
+      return std::pair(i, half);
     }
   }
-  return rises_m.size() >= kMinDividers && rises_m.size() > num_level
-             ? std::optional(quantile(std::move(rises_m), 0.5))
-             : std::nullopt;
+  return std::nullopt;
+}
+
+/// Where the ground rises in most places side by side after a place of the dividers: at a kerb, a hedge or a
+/// wall, to which lines are painted. The foot of a wall is round in a height map, hence where half of the
+/// height is reached.
+std::optional<Rise> riseAfter(const GroundImage& ground, const BayLattice& lattice,
+                              const std::vector<int>& numbers, double from_m, double to_m) {
+  constexpr int kPlaces = 4;  // per bay
+  const double cell_m = ground.cellSize_m();
+  std::vector<double> begins_m, halves_m;
+  size_t num_level = 0;
+  for (int place = kPlaces * numbers.front(); place <= kPlaces * numbers.back(); ++place) {
+    const Eigen::Vector2d start_m =
+        lattice.entry_m + static_cast<double>(place) / kPlaces * lattice.step_m + from_m * lattice.into;
+    if (!ground.at(start_m - cell_m * lattice.into)) {
+      continue;  // a car stands there
+    }
+    std::vector<double> heights_m;
+    for (double at_m = from_m; at_m < to_m; at_m += cell_m) {
+      heights_m.push_back(ground.height_m(start_m + (at_m - from_m) * lattice.into));
+    }
+    bool is_unknown = false;
+    if (const auto rise = firstRise(heights_m, cell_m, &is_unknown)) {
+      begins_m.push_back(from_m + static_cast<double>(rise->first) * cell_m);
+      halves_m.push_back(from_m + static_cast<double>(rise->second) * cell_m);
+    } else {
+      num_level += is_unknown ? 0 : 1;
+    }
+  }
+  if (halves_m.size() < kMinDividers || halves_m.size() <= num_level) {
+    return std::nullopt;
+  }
+  return Rise{quantile(std::move(begins_m), 0.5), quantile(std::move(halves_m), 0.5)};
 }
 
 /// Contrasts of the dividers at one place along them, where both sides are seen, in ascending order.
@@ -113,7 +149,7 @@ double paleContrast(const LatticeLines& lines) {
 DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, const std::vector<int>& numbers,
                        double line_contrast, const BaySizes& sizes) {
   constexpr double kBefore_m = 2.0, kMinContrast = 0.02, kBareRun_m = 0.3, kUnseenRun_m = 0.5;
-  constexpr double kSeenSigma_m = 0.06;
+  constexpr double kSeenSigma_m = 0.06, kRiseSigma_m = 0.15;
   const double step_m = ground.cellSize_m();
   const double least = std::max(kMinContrast, kBareRatio * line_contrast);
   // Where few of the dividers are still seen, they may belong to another row behind this one.
@@ -160,12 +196,16 @@ DividerExtent extentOf(const GroundImage& ground, const BayLattice& lattice, con
     extent.begin_m = 0.0;
   }
   extent.end_m = walk(inside_m, 2.0 * sizes.max_length, &extent.is_end_seen) + 0.5 * step_m;
-  if (const auto rise_m = riseAfter(ground, lattice, numbers, extent.end_m - 0.5 * step_m)) {
-    extent.end_m = *rise_m;
+  const double last_m = extent.end_m - 0.5 * step_m;
+  const std::optional<Rise> rise = riseAfter(ground, lattice, numbers, last_m, sizes.max_length);
+  // Level ground without paint before the rise is what is seen behind the ends.
+  const bool is_at_rise = rise && !(extent.is_end_seen && rise->begin_m - last_m > kBareRun_m - 2.0 * step_m);
+  if (is_at_rise) {
+    extent.end_m = rise->half_m;
     extent.is_end_seen = true;
   }
   extent.is_end_seen = extent.is_end_seen && extent.length_m() >= sizes.min_length;
-  extent.end_sigma_m = kSeenSigma_m;
+  extent.end_sigma_m = is_at_rise ? kRiseSigma_m : kSeenSigma_m;
   if (!extent.is_end_seen) {
     const double seen_m = extent.length_m() <= sizes.max_length ? extent.length_m() : 0.0;
     extent.end_m = extent.begin_m + std::max(seen_m, sizes.usual_length);
