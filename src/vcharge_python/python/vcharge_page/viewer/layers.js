@@ -15,7 +15,7 @@ export function baysOf(bays) {
     geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(corners.flat()), 3));
     geometry.setIndex([0, 1, 2, 0, 2, 3]);
     group.add(new THREE.Mesh(geometry, new THREE.MeshBasicMaterial(
-        {color, transparent: true, opacity: 0.3, side: THREE.DoubleSide, depthWrite: false})));
+        {color, transparent: true, opacity: 0.3, depthWrite: false})));
     group.add(linesOf(corners.flatMap((corner, i) => [corner, corners[(i + 1) % 4]]), color));
   }
   return group;

@@ -12,7 +12,7 @@ import {Pictures} from "./pictures.js";
 import {LayerList, TimeBar} from "./panel.js";
 
 const GROUND_REACH_M = 400;
-const WANTED_MS = 35;  // time of a frame while the view moves
+const WANTED_MS = 35, FAST_MS = 18;  // times of a frame while the view moves
 const ONE_MOVEMENT_MS = 150;  // from one frame to the wish for the next
 const REST_MS = 400;  // without movement, until details follow
 
@@ -32,7 +32,7 @@ class Page {
     this.scene = new THREE.Scene();  // what stands still
     this.moving = new THREE.Scene();
     this.frames = 0;
-    this.isWaiting = false;
+    this.isWaiting = this.isFast = false;
     this.view = new View(this.canvas, () => this.draw());
     this.layers = new LayerList(document.getElementById("layers"), () => this.draw());
     this.fill();
@@ -170,14 +170,13 @@ class Page {
     this.isWaiting = false;
     if (this.isStillOld) {
       if (this.isMovement && this.wasStillDrawn) {
-        this.points.adapt(WANTED_MS / (now - this.lastFrame_ms));
+        const frame_ms = now - this.lastFrame_ms;
+        this.points.adapt(WANTED_MS / frame_ms);
+        this.isFast = frame_ms < (this.isFast ? 2 * WANTED_MS : FAST_MS);
       }
       this.drawStill(false);
       clearTimeout(this.rest);
-      this.rest = setTimeout(() => {
-        this.drawStill(true);
-        this.drawMoving();
-      }, REST_MS);
+      this.rest = setTimeout(() => this.drawAtRest(), REST_MS);
     }
     this.wasStillDrawn = this.isStillOld;
     this.isStillOld = false;
@@ -190,8 +189,18 @@ class Page {
     }
   }
 
+  drawAtRest() {
+    if (!this.isWaiting) {  // else a slow computer still moves
+      this.drawStill(true);
+      this.drawMoving();
+    }
+  }
+
   drawStill(isAtRest) {
     this.points.select(this.view.camera, this.canvas.width, this.canvas.height, isAtRest);
+    if (this.surface) {
+      this.surface.setFine(isAtRest || this.isFast);
+    }
     this.still.draw(this.scene, this.view.camera);
   }
 }

@@ -18,7 +18,7 @@ export class StillPicture {
   constructor(renderer) {
     this.renderer = renderer;
     this.target = new THREE.WebGLRenderTarget(1, 1, {minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter});
-    this.target.depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedIntType);
+    this.target.depthTexture = new THREE.DepthTexture(1, 1, THREE.FloatType);
     const material = new THREE.ShaderMaterial({
       vertexShader: VERTEX_SHADER, fragmentShader: FRAGMENT_SHADER, extensions: {fragDepth: true}, depthFunc: THREE.AlwaysDepth,
       uniforms: {colors: {value: this.target.texture}, depths: {value: this.target.depthTexture}}});

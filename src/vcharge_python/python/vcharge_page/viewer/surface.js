@@ -1,6 +1,7 @@
 // The surface of a height map: a grid of triangles with a picture over it.
 
 const UNKNOWN = -32768, LARGEST = 32767;
+const COARSE_STEP = 4;  // of the cells that are drawn while the view of a slow computer moves
 
 export class Surface {
   /** `given`: the description; `bytes`: heights, int16, rows along y; `address`: the picture; `onLoad` is called once it is there. */
@@ -9,7 +10,6 @@ export class Surface {
     const packed = new Int16Array(bytes.buffer, bytes.byteOffset, given.rows * given.columns);
     this.heights = Float32Array.from(packed, (value) => value === UNKNOWN ? NaN :
         given.lowM + (value + LARGEST) / (2 * LARGEST) * (given.highM - given.lowM));
-    const geometry = this.geometryOf();
     const texture = new THREE.Texture(new Image());
     texture.flipY = false;  // row 0 is at the smallest y
     texture.minFilter = THREE.LinearFilter;
@@ -19,28 +19,50 @@ export class Surface {
       onLoad();
     };
     texture.image.src = address;
-    this.mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({map: texture, side: THREE.DoubleSide}));
+    const material = new THREE.MeshBasicMaterial({map: texture, side: THREE.DoubleSide});
+    this.fine = new THREE.Mesh(this.geometryOf(1), material);
+    this.coarse = new THREE.Mesh(this.geometryOf(COARSE_STEP), material);
+    this.mesh = new THREE.Group().add(this.fine, this.coarse);
+    this.setFine(true);
   }
 
-  geometryOf() {
-    const {rows, columns, originM, cellM, pictureCornerM, pictureSizeM} = this.given;
+  setFine(isFine) {
+    this.fine.visible = isFine;
+    this.coarse.visible = !isFine;
+  }
+
+  /** Triangles between neighbours among every `step`-th height of both directions. */
+  geometryOf(step) {
+    const {originM, cellM, pictureCornerM, pictureSizeM} = this.given;
+    const rows = Math.ceil(this.given.rows / step), columns = Math.ceil(this.given.columns / step);
     const positions = new Float32Array(3 * rows * columns), uvs = new Float32Array(2 * rows * columns);
-    const indices = [];
+    const indices = new Uint32Array(6 * rows * columns);
+    const known = new Uint8Array(rows * columns);
     for (let row = 0, i = 0; row < rows; ++row) {
       for (let column = 0; column < columns; ++column, ++i) {
-        const x = originM[0] + column * cellM, y = originM[1] + row * cellM, z = this.heights[i];
-        positions.set([x, y, Number.isNaN(z) ? 0 : z], 3 * i);
-        uvs.set([(x - pictureCornerM[0]) / pictureSizeM[0], (y - pictureCornerM[1]) / pictureSizeM[1]], 2 * i);
-        const corners = [i, i + 1, i + columns, i + columns + 1];
-        if (row + 1 < rows && column + 1 < columns && corners.every((corner) => !Number.isNaN(this.heights[corner]))) {
-          indices.push(i, i + 1, i + columns + 1, i, i + columns + 1, i + columns);
+        const z = this.heights[row * step * this.given.columns + column * step];
+        known[i] = Number.isNaN(z) ? 0 : 1;
+        const x = positions[3 * i] = originM[0] + column * step * cellM, y = positions[3 * i + 1] = originM[1] + row * step * cellM;
+        positions[3 * i + 2] = known[i] ? z : 0;
+        uvs[2 * i] = (x - pictureCornerM[0]) / pictureSizeM[0];
+        uvs[2 * i + 1] = (y - pictureCornerM[1]) / pictureSizeM[1];
+      }
+    }
+    let number = 0;
+    for (let row = 0; row + 1 < rows; ++row) {
+      for (let column = 0; column + 1 < columns; ++column) {
+        const i = row * columns + column;
+        if (known[i] && known[i + 1] && known[i + columns] && known[i + columns + 1]) {
+          for (const corner of [i, i + 1, i + columns + 1, i, i + columns + 1, i + columns]) {
+            indices[number++] = corner;
+          }
         }
       }
     }
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
     geometry.setAttribute("uv", new THREE.BufferAttribute(uvs, 2));
-    geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(indices), 1));
+    geometry.setIndex(new THREE.BufferAttribute(indices.subarray(0, number), 1));
     return geometry;
   }
 

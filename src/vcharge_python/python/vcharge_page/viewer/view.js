@@ -77,7 +77,7 @@ export class View {
     this.camera.position.set(this.target.x - flat * Math.cos(this.heading_rad),
                              this.target.y - flat * Math.sin(this.heading_rad),
                              this.target.z + this.distance_m * Math.sin(this.slope_rad));
-    this.camera.near = Math.max(0.05, 0.002 * this.distance_m);
+    this.camera.near = Math.max(0.05, 0.01 * this.distance_m);
     this.camera.updateProjectionMatrix();
     this.camera.lookAt(this.target);
     this.camera.updateMatrixWorld(true);
