@@ -27,7 +27,8 @@ class Browser:
             os.dup2(13, 3)
             os.dup2(14, 4)
         self.process = subprocess.Popen(  # pylint: disable=consider-using-with,subprocess-popen-preexec-fn
-            [CHROMIUM, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run", "--disable-background-networking",
+            [CHROMIUM, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run",
+             "--disable-background-networking",
              "--disable-component-update", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
              "--disable-dev-shm-usage", f"--user-data-dir={self.folder}", f"--window-size={width},{height}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=connect, close_fds=False)
@@ -101,7 +102,8 @@ class Browser:
 
     def run(self, script, timeout_s=120):
         """The value of a script; a promise is awaited."""
-        result = self.call("Runtime.evaluate", {"expression": script, "returnByValue": True, "awaitPromise": True}, self.session, timeout_s)
+        result = self.call("Runtime.evaluate", {"expression": script, "returnByValue": True, "awaitPromise": True}, self.session,
+                           timeout_s)
         if "exceptionDetails" in result:
             raise RuntimeError(result["exceptionDetails"].get("exception", {}).get("description", "the script failed"))
         return result["result"].get("value")
@@ -114,7 +116,8 @@ class Browser:
         self.call("Input.dispatchMouseEvent", {"type": kind, "x": x, "y": y, **more}, self.session)
 
     def touch(self, kind, points):
-        self.call("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]},
+        self.call("Input.dispatchTouchEvent", {"type": kind,
+                                               "touchPoints": [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]},
                   self.session)
 
     def picture(self, path):

@@ -43,8 +43,8 @@ def write_height_map(folder, frame="map"):
 
 
 def write_bays(path, frame="map"):
-    path.write_text(f"frame: {frame}\nbays:\n  - {{id: 1, row: 0, kind: perpendicular, state: free, corners_m: [[-4, 14], [4, 14], [4, 26], "
-                    "[-4, 26]], entry_sigma_m: 0.1, end_sigma_m: 0.1, confidence: 1}\n")
+    path.write_text(f"frame: {frame}\nbays:\n  - {{id: 1, row: 0, kind: perpendicular, state: free, corners_m: [[-4, 14], "
+                    "[4, 14], [4, 26], [-4, 26]], entry_sigma_m: 0.1, end_sigma_m: 0.1, confidence: 1}\n")
     return path
 
 
@@ -68,7 +68,8 @@ def write_bag(path, rig, stamps):
         for i, stamp in enumerate(stamps):
             for camera in rig:
                 width, height = camera.image_size_px
-                message = Image(height=height, width=width, step=width, encoding="mono8", data=bytes([10 * i % 250]) * (width * height))
+                message = Image(height=height, width=width, step=width, encoding="mono8",
+                                data=bytes([10 * i % 250]) * (width * height))
                 message.header.stamp = genpy.Time.from_sec(0) + genpy.Duration(stamp // 10 ** 9, stamp % 10 ** 9)
                 bag.write(f"/camera/{camera.name}/image_raw", message, genpy.Time(1 + i))
     return path
@@ -117,7 +118,8 @@ class PartsTest(FolderTest):
 
     def test_stamps_within_the_tolerance_belong_to_a_keyframe(self):
         near = pictures.NearStamps([100, 200, 1000], 10)
-        self.assertEqual([near.nearest(stamp) for stamp in (89, 90, 100, 106, 209, 211, 1005)], [None, 100, 100, 100, 200, None, 1000])
+        self.assertEqual([near.nearest(stamp) for stamp in (89, 90, 100, 106, 209, 211, 1005)],
+                         [None, 100, 100, 100, 200, None, 1000])
 
 
 class SceneTest(FolderTest):
@@ -140,7 +142,8 @@ class SceneTest(FolderTest):
         timeline, stamps = poses.Timeline(self.map), self.map.keyframes.stamps_ns
         pose = timeline.map_from_vehicle(0, int(stamps[3] + stamps[4]) // 2)
         angle = 2 * np.pi * 3.5 / NUM_KEYFRAMES
-        np.testing.assert_allclose(pose[:2, 3], [RADIUS_M * np.sin(angle), RADIUS_M * (1 - np.cos(angle))], atol=0.2)  # chord and arc
+        np.testing.assert_allclose(pose[:2, 3], [RADIUS_M * np.sin(angle), RADIUS_M * (1 - np.cos(angle))],
+                                   atol=0.2)  # chord and arc
         np.testing.assert_allclose(pose[:2, 0], [np.cos(angle), np.sin(angle)], atol=1e-9)
         self.assertIsNone(timeline.session_at(0))
 
@@ -238,6 +241,9 @@ class BrowserTest(FolderTest):
             changed = np.abs(self.picture() - before).sum(2)[:, 270:] > 30
             self.assertGreater(changed.sum(), 10, name)
         self.assertFalse(self.browser.run("document.querySelectorAll('#layers input:checked').length"))
+        fine = self.browser.run("[false, true].map((isAtRest) => { vchargePage.isFast = false; vchargePage.drawStill(isAtRest);"
+                                " return vchargePage.surface.fine.visible; })")
+        self.assertEqual(fine, [False, True], "a slow computer draws the surface coarsely while the view moves")
         dark = self.picture()[100:600, 300:850]
         self.assertLess(dark.max() - dark.min(), 20, "nothing is shown")
         self.check()
@@ -269,8 +275,8 @@ class BrowserTest(FolderTest):
         self.show_everything()
 
         def state():
-            return np.array(self.browser.run("(({heading_rad, slope_rad, distance_m, target}) => [heading_rad, slope_rad, distance_m, "
-                                             "target.x, target.y])(vchargePage.view)"))
+            return np.array(self.browser.run("(({heading_rad, slope_rad, distance_m, target}) => [heading_rad, slope_rad, "
+                                             "distance_m, target.x, target.y])(vchargePage.view)"))
 
         def drag(button, buttons):
             self.browser.mouse("mousePressed", 600, 350, button=button, buttons=buttons, clickCount=1)
@@ -303,7 +309,8 @@ class BrowserTest(FolderTest):
         click(760, 420)
         text = self.browser.run("document.getElementById('told').textContent")
         # Pixels of the view from above, whose middle is the target.
-        per_pixel = self.browser.run("2 * vchargePage.view.distance_m * Math.tan(vchargePage.view.camera.fov * Math.PI / 360) / 720")
+        per_pixel = self.browser.run("(({distance_m, camera}) => 2 * distance_m * Math.tan(camera.fov * Math.PI / 360) / 720)"
+                                     "(vchargePage.view)")
         self.assertAlmostEqual(float(text.split(" m")[0]), per_pixel * np.hypot(200, 120), delta=0.02 * per_pixel * 233)
 
     def test_fewer_points_are_drawn_while_the_view_moves(self):
@@ -321,13 +328,13 @@ class BrowserTest(FolderTest):
         self.assertGreater(moving[0], 0.8 * moving[1])
         self.assertGreater(resting, 2 * moving[0])
         # Slow frames lower the budget, fast ones raise it again.
-        budgets = self.browser.run("[0.2, 0.2, 5, 5].map((factor) => { vchargePage.drawStill(false); vchargePage.points.adapt(factor);"
-                                   " return vchargePage.points.budget; })")
+        budgets = self.browser.run("[0.2, 0.2, 5, 5].map((factor) => { vchargePage.drawStill(false);"
+                                   " vchargePage.points.adapt(factor); return vchargePage.points.budget; })")
         self.assertLess(budgets[1], budgets[0])
         self.assertGreater(budgets[3], budgets[1])
         # What is near and large on the screen gets more of its points.
-        parts = self.browser.run("(() => { const {view, points} = vchargePage; view.target.set(-100, 0, 0); view.distance_m = 20; view.slope_rad = 0.3; "
-                                 "view.heading_rad = 0; view.change(); vchargePage.drawStill(false); "
+        parts = self.browser.run("(() => { const {view, points} = vchargePage; view.target.set(-100, 0, 0); view.distance_m = 20; "
+                                 "view.slope_rad = 0.3; view.heading_rad = 0; view.change(); vchargePage.drawStill(false); "
                                  "return points.chunks.filter((one) => one.mesh.visible).map((one) => "
                                  "[one.centre.x, one.mesh.geometry.drawRange.count / one.count]); })()")
         x, drawn = np.array(parts).T

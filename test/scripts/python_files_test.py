@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The module vcharge: range maps, height maps, bays, obstacle maps, objects and images; what is damaged is refused with the file and
-the key."""
+"""The module vcharge: range maps, height maps, bays, obstacle maps, objects and images; what is damaged is refused with the file
+and the key."""
 import pathlib
 import sys
 
@@ -76,7 +76,8 @@ class RangeMapTest(DamageTest):
         return vcharge.read_range_map(self.folder, "left", STAMP)
 
     def test_points_are_at_their_ranges_along_the_rays(self):
-        self.assertEqual((vcharge.list_range_map_cameras(self.folder), vcharge.list_range_maps(self.folder, "left")), (["left"], [STAMP]))
+        self.assertEqual((vcharge.list_range_map_cameras(self.folder), vcharge.list_range_maps(self.folder, "left")),
+                         (["left"], [STAMP]))
         found = self.read()
         np.testing.assert_array_equal(found.range_m, self.ranges)
         points = found.points_in_camera()
@@ -89,7 +90,8 @@ class RangeMapTest(DamageTest):
         self.refuses_cut_files([self.stem.parent / f"{STAMP}_{name}" for name in
                                 ("range.tiff", "sigma.tiff", "confidence.tiff")], self.read)
         self.refuses_changes(self.yaml, [("  xi: 1.5\n", "", "mei.xi: missing"), ("gamma1: 40", "gamma1: -1", "gamma1"),
-                                         ("frame_id: camera_left_optical\n", "", "frame_id: missing"), ("mei:", "mei: 3\nx:", "mei")],
+                                         ("frame_id: camera_left_optical\n", "", "frame_id: missing"),
+                                         ("mei:", "mei: 3\nx:", "mei")],
                              self.read)
         write_image(self.stem.parent / f"{STAMP}_sigma.tiff", self.ranges[:5])
         self.refuses(("_sigma.tiff", "of 32 x 20"), self.read)
@@ -121,11 +123,13 @@ class HeightMapTest(DamageTest):
         self.assertEqual((found.frame_id, found.gray[0, 0], found.solid), ("map", 70, None))
 
     def test_refuses_missing_and_damaged_files(self):
-        self.refuses_cut_files([self.folder / name for name in ("height_map.tiff", "height_map_confidence.tiff", "height_map_gray.png")],
-                               self.read)
-        self.refuses_changes(self.yaml, [("cell_size_m: 0.5\n", "", "cell_size_m: missing"), ("0.5", "-0.5", "a positive number of metres"),
+        names = ("height_map.tiff", "height_map_confidence.tiff", "height_map_gray.png")
+        self.refuses_cut_files([self.folder / name for name in names], self.read)
+        self.refuses_changes(self.yaml, [("cell_size_m: 0.5\n", "", "cell_size_m: missing"),
+                                         ("0.5", "-0.5", "a positive number of metres"),
                                          ("size_cells: [6, 4]", "size_cells: [6]", "size_cells"),
-                                         ("[-1, 2.5]", "[-1, .inf]", "origin_m"), ("frame: map\n", "", "frame: missing")], self.read)
+                                         ("[-1, 2.5]", "[-1, .inf]", "origin_m"), ("frame: map\n", "", "frame: missing")],
+                             self.read)
         self.yaml.write_text(HEIGHT_YAML.replace("[6, 4]", "[6, 5]"))
         self.refuses(("height_map.tiff", "of 6 x 5"), self.read)
         self.refuses("height_map.yaml: no such file", vcharge.read_height_map, self.folder / "none" / "height_map.yaml")
@@ -135,10 +139,12 @@ class BaysTest(DamageTest):
     def test_reads_and_refuses_bays(self):
         path = self.write("bays.yaml", BAYS_YAML)
         bay, = vcharge.read_bays(path).bays
-        self.assertEqual((bay.id, bay.row, bay.kind, bay.state, bay.end_sigma_m, bay.confidence), (3, 1, "angled", "free", 1e-5, 0.9))
+        self.assertEqual((bay.id, bay.row, bay.kind, bay.state, bay.end_sigma_m, bay.confidence),
+                         (3, 1, "angled", "free", 1e-5, 0.9))
         np.testing.assert_array_equal(bay.corners_m, [[0, 0], [2.5, 0], [2.5, -5], [0, -5]])
         self.refuses_changes(path, [("kind: angled, ", "", "bays[0].kind: missing"), ("free", "full", "free, occupied or unknown"),
-                                    (", [0, -5]]", "]", "four corners"), ("0.9", "1.9", "from 0 to 1"), ("id: 3", "id: x", "bays[0].id"),
+                                    (", [0, -5]]", "]", "four corners"), ("0.9", "1.9", "from 0 to 1"),
+                                    ("id: 3", "id: x", "bays[0].id"),
                                     ("[2.5, 0]", "[2.5]", "corners_m[1]"), ("bays:", "bay:", "bays: missing")],
                              lambda: vcharge.read_bays(path))
         self.assertEqual(vcharge.read_bays(self.write("none.yaml", "frame: map\nbays: []\n")).bays, [])
@@ -164,7 +170,8 @@ class ObstacleMapTest(DamageTest):
         self.assertEqual((found.state[0, 1], found.state[4, 6], found.state[2, 2]), (100, 0, -1))
         np.testing.assert_allclose(found.centres_m()[0, 1], [-1.85, 1.05])
         np.testing.assert_allclose(found.fixed_from_vehicle @ [1, 0, 0, 1], [1.28, 2.96, 0, 1])
-        self.assertEqual((found.point_m[0, 0].tolist(), found.age_s[0, 0], found.stamp_ns, found.frame_id), ([0, 1], 5, STAMP, "odom"))
+        self.assertEqual((found.point_m[0, 0].tolist(), found.age_s[0, 0], found.stamp_ns, found.frame_id),
+                         ([0, 1], 5, STAMP, "odom"))
         plain = vcharge.read_occupancy_grid(self.write("grid.yaml", GRID_YAML.split("stamp_ns")[0]))
         self.assertEqual((plain.stamp_ns, plain.state[0, 1]), (None, 100))
 
@@ -180,8 +187,10 @@ class ObstacleMapTest(DamageTest):
 
     def test_refuses_missing_and_damaged_files(self):
         self.refuses_cut_files([self.folder / f"{STAMP}_{name}.tiff" for name in ("x", "age")], self.read)
-        self.refuses_changes(self.yaml, [("resolution: 0.1\n", "", "resolution: missing"), ("frame_id: odom\n", "", "frame_id: missing"),
-                                         ("0.6, 0.8", "0.6, 0.9", "unit quaternion"), (f"stamp_ns: {STAMP}\n", "", "stamp_ns: missing")],
+        self.refuses_changes(self.yaml, [("resolution: 0.1\n", "", "resolution: missing"),
+                                         ("frame_id: odom\n", "", "frame_id: missing"),
+                                         ("0.6, 0.8", "0.6, 0.9", "unit quaternion"),
+                                         (f"stamp_ns: {STAMP}\n", "", "stamp_ns: missing")],
                              self.read)
         write_image(self.folder / f"{STAMP}.pgm", np.full((5, 7), 100, np.uint8))
         self.refuses("gray levels 0, 205 and 254, got 100", self.read)
@@ -202,11 +211,14 @@ class ObjectsTest(DamageTest):
 
         def read():
             return vcharge.read_objects(self.folder)
-        self.refuses_changes(frames_path, [("200,", "100,", ":3: stamp_ns: expected increasing"), (",0.5,1", ",0.5,2", "num_objects"),
+        self.refuses_changes(frames_path, [("200,", "100,", ":3: stamp_ns: expected increasing"),
+                                           (",0.5,1", ",0.5,2", "num_objects"),
                                            ("yaw_rad", "yaw", ":1: expected the header"), ("200,1.5", "200,nan", ":3: x_m")], read)
         self.refuses_changes(path, [("100,7", "101,7", "a stamp of objects_frames.csv"), ("adult", "ghost", "unknown, adult"),
-                                    (";3 4.3", "", "footprint_m"), ("0.9,0.8", "1.9,0.8", "class_probability"), (",0.01,", ",-0.01,", "cov_x_x"),
-                                    ("100,7", "100,-7", ":2: id"), (OBJECTS.split("\n")[1], OBJECTS.split("\n")[1] * 2, "columns")], read)
+                                    (";3 4.3", "", "footprint_m"), ("0.9,0.8", "1.9,0.8", "class_probability"),
+                                    (",0.01,", ",-0.01,", "cov_x_x"),
+                                    ("100,7", "100,-7", ":2: id"), (OBJECTS.split("\n")[1], OBJECTS.split("\n")[1] * 2, "columns")],
+                             read)
         path.write_text(OBJECTS + OBJECTS.split("\n")[1] + "\n")
         self.refuses("each id once", read)
         path.unlink()
@@ -226,7 +238,8 @@ class ImagesTest(FolderTest):
             packed.header.stamp = genpy.Time(4)
             bag.write("/camera/rear/image_raw/compressed", packed, genpy.Time(4))
         found = list(vcharge.read_images(self.folder / "drive.bag", ["left", "rear"], [10 ** 9, 2 * 10 ** 9, 4 * 10 ** 9]))
-        self.assertEqual([(stamp, camera) for stamp, camera, _ in found], [(10 ** 9, "left"), (2 * 10 ** 9, "left"), (4 * 10 ** 9, "rear")])
+        self.assertEqual([(stamp, camera) for stamp, camera, _ in found],
+                         [(10 ** 9, "left"), (2 * 10 ** 9, "left"), (4 * 10 ** 9, "rear")])
         for _, _, image in found:
             np.testing.assert_array_equal(image, gray)
         self.refuses(("drive.bag: /camera/left/image_raw", "16UC1"), list, vcharge.read_images(self.folder / "drive.bag", ["left"]))
@@ -254,7 +267,8 @@ class ToolsTest(FolderTest):
         found = vcharge.read_range_map(ranges, "left", stamp)
         # Confident points lie on the true surface or on what stands on it, as far as both are known.
         vehicle = truth.world_from_vehicle[np.argmin(np.abs(truth.stamps_ns - stamp))]
-        points = vcharge.transforms.apply(vehicle @ rig["left"].vehicle_from_camera, found.points_in_camera()[found.confidence > 0.5])
+        points = vcharge.transforms.apply(vehicle @ rig["left"].vehicle_from_camera,
+                                          found.points_in_camera()[found.confidence > 0.5])
         below = points[np.isfinite(points).all(1)]
         heights = surface.height_at(below[:, :2])
         known = np.isfinite(heights) & (below[:, 2] < 0.1)
@@ -262,7 +276,8 @@ class ToolsTest(FolderTest):
         self.assertLess(np.median(np.abs(heights - below[:, 2])[known]), 0.05)
 
         obstacles = self.folder / "obstacles"
-        status, _, errors = run([tool("vcharge_obstacles", "detect_obstacles"), "--bag", drive.bag, "--rig", drive.rig, "--output", obstacles])
+        status, _, errors = run([tool("vcharge_obstacles", "detect_obstacles"), "--bag", drive.bag, "--rig", drive.rig, "--output",
+                                 obstacles])
         self.assertEqual((status, errors), (0, []))
         stamp = vcharge.list_obstacle_maps(obstacles)[-1]
         grid, scans = vcharge.read_obstacle_map(obstacles, stamp), vcharge.read_obstacle_scans(obstacles, stamp)

@@ -98,11 +98,15 @@ class RigTest(FolderTest):
     def test_refuses_bad_rigs_with_the_key(self):
         for old, new, words in (
                 ("fx: 300", "fz: 300", ("cameras.left.intrinsics.fz", "unknown key")), ("fx: 300, ", "", "intrinsics.fx: missing"),
-                ("fx: 300", "fx: .nan", "intrinsics.fx: expected a finite number"), ("fx: 300", "fx: -3", "intrinsics.fx: expected a positive"),
+                ("fx: 300", "fx: .nan", "intrinsics.fx: expected a finite number"),
+                ("fx: 300", "fx: -3", "intrinsics.fx: expected a positive"),
                 ("model: pinhole", "model: orthographic", "cameras.left.model: expected mei, kannala_brandt or pinhole"),
-                ("0.6, 0.8", "0.6, 0.9", "rotation_xyzw: expected a unit quaternion"), ("[640, 400]", "[640, 4.5]", "image_size_px"),
-                ("[640, 400]", "[64, 40]", ("left.mask", "left.png", "64 x 40")), ("mask: left.png", "mask: right.png", "right.png"),
-                ("cameras:\n  left:", "cameras:\n  left: {}\n  left:", "left is given twice"), ("left:", "le ft:", "cameras.le ft: expected"),
+                ("0.6, 0.8", "0.6, 0.9", "rotation_xyzw: expected a unit quaternion"),
+                ("[640, 400]", "[640, 4.5]", "image_size_px"),
+                ("[640, 400]", "[64, 40]", ("left.mask", "left.png", "64 x 40")),
+                ("mask: left.png", "mask: right.png", "right.png"),
+                ("cameras:\n  left:", "cameras:\n  left: {}\n  left:", "left is given twice"),
+                ("left:", "le ft:", "cameras.le ft: expected"),
                 ("vehicle_frame", "vehicle", "vehicle: unknown key"), ("cameras:", "cameras: [", "line 4: not valid YAML"),
                 ("translation_m: [1.5", "translation_m: [nan", "translation_m: expected a list of 3")):
             self.assertIn(old, RIG)
@@ -133,7 +137,8 @@ class MapTest(FolderTest):
     def test_reads_what_the_library_writes(self):
         found = vcharge.read_map(self.analytic("lot.vmap"))
         angle = 2 * np.pi * np.arange(24) / 24  # a circle of 20 m
-        np.testing.assert_allclose(found.keyframes.positions_m[:, :2], 20 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1), atol=1e-9)
+        np.testing.assert_allclose(found.keyframes.positions_m[:, :2], 20 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1),
+                                   atol=1e-9)
         self.assertEqual(found.keyframes.stamps_ns[1] - found.keyframes.stamps_ns[0], 500_000_000)
         self.assertEqual((found.sessions[0].component, found.version, found.versions), (0, 1, [1]))
         self.assertEqual(found.provenance["bag"], "analytic.bag")
@@ -193,11 +198,16 @@ class MapTest(FolderTest):
     def test_refuses_damage(self):
         whole = self.analytic("lot.vmap").read_bytes()
         for change, words in (
-                ("DROP TABLE landmark", "no such table: landmark"), ("UPDATE keyframe SET qw = 2.0 WHERE id = 3", "unit quaternions"),
-                ("UPDATE keyframe SET session = 4 WHERE id = 3", "no such session"), ("DELETE FROM keyframe WHERE id = 3", "no such keyframe"),
-                ("DELETE FROM landmark WHERE id = 3", "no such landmark"), ("UPDATE image SET camera = 8 WHERE id = 0", "no such camera"),
-                ("UPDATE image SET num_observations = 1 WHERE id = 0", "as many landmarks"), ("DELETE FROM version", "holds no version"),
-                ("UPDATE landmark SET covariance_3x3_f64 = x'00'", "covariance"), ("DELETE FROM meta WHERE key = 'rig'", "rig is missing"),
+                ("DROP TABLE landmark", "no such table: landmark"),
+                ("UPDATE keyframe SET qw = 2.0 WHERE id = 3", "unit quaternions"),
+                ("UPDATE keyframe SET session = 4 WHERE id = 3", "no such session"),
+                ("DELETE FROM keyframe WHERE id = 3", "no such keyframe"),
+                ("DELETE FROM landmark WHERE id = 3", "no such landmark"),
+                ("UPDATE image SET camera = 8 WHERE id = 0", "no such camera"),
+                ("UPDATE image SET num_observations = 1 WHERE id = 0", "as many landmarks"),
+                ("DELETE FROM version", "holds no version"),
+                ("UPDATE landmark SET covariance_3x3_f64 = x'00'", "covariance"),
+                ("DELETE FROM meta WHERE key = 'rig'", "rig is missing"),
                 ("UPDATE meta SET value = 'cameras: {}' WHERE key = 'rig'", "cameras: expected"),
                 ("UPDATE camera SET mask_png = x'0102'", "its mask differs"),
                 ("INSERT INTO landmark SELECT 99999, 0, 0, 0, NULL, NULL, 0, 1", "without an observation")):

@@ -181,8 +181,8 @@ class PinholeCamera(CameraModel):
 
 
 class KannalaBrandtCamera(CameraModel):
-    """Radius as an odd polynomial of the angle from the axis (Kannala and Brandt, "A generic camera model and calibration method for
-    conventional, wide-angle, and fish-eye lenses", PAMI 2006), up to the angle at which it stops growing."""
+    """Radius as an odd polynomial of the angle from the axis (Kannala and Brandt, "A generic camera model and calibration method
+    for conventional, wide-angle, and fish-eye lenses", PAMI 2006), up to the angle at which it stops growing."""
 
     name = "kannala_brandt"
     parameter_names = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")

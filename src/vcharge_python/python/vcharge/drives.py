@@ -11,8 +11,8 @@ TO_GRAY = {"bgr8": cv2.COLOR_BGR2GRAY, "rgb8": cv2.COLOR_RGB2GRAY}
 
 def read_images(bag, cameras: Collection[str], stamps_ns: Collection[int] | None = None) -> Iterator[tuple[int, str, np.ndarray]]:
     """Stamp (ns), camera and gray image (uint8, height x width) of each image of these cameras in a bag, in its order, from
-    /camera/<name>/image_raw or its compressed topic; with `stamps_ns` of these stamps only. InputError naming the bag and the topic. Needs
-    the Python package rosbag."""
+    /camera/<name>/image_raw or its compressed topic; with `stamps_ns` of these stamps only. InputError naming the bag and the
+    topic. Needs the Python package rosbag."""
     import rosbag  # pylint: disable=import-outside-toplevel  # what reads files alone works without ROS
 
     names = {f"/camera/{camera}/image_raw{ending}": camera for camera in cameras for ending in ("", "/compressed")}

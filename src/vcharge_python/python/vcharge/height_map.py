@@ -9,15 +9,23 @@ from vcharge.files import read_floats, read_gray, read_yaml
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HeightMap:
-    """Height of the surface seen from above, on a regular grid: rows along y, columns along x. All arrays have one shape."""
+    """Height of the surface seen from above, on a regular grid: rows along y, columns along x. All arrays have one shape.
 
-    frame_id: str  #: "map", or "world" for the truth of a simulated drive
-    origin_m: np.ndarray  #: x, y of the centre of the cell in row 0, column 0
+    frame_id: "map", or "world" for the truth of a simulated drive
+    origin_m: x, y of the centre of the cell in row 0, column 0
+    height_m: float32, NaN where not observed
+    confidence: float32 from 0 (not observed) to 1
+    gray: uint8, brightness seen by the cameras
+    solid: uint8, not 0 for obstacles without a known height (walls, pillars)
+    """
+
+    frame_id: str
+    origin_m: np.ndarray
     cell_size_m: float
-    height_m: np.ndarray  #: float32, NaN where not observed
-    confidence: np.ndarray | None = None  #: float32 from 0 (not observed) to 1
-    gray: np.ndarray | None = None  #: uint8, brightness seen by the cameras
-    solid: np.ndarray | None = None  #: uint8, not 0 for obstacles without a known height (walls, pillars)
+    height_m: np.ndarray
+    confidence: np.ndarray | None = None
+    gray: np.ndarray | None = None
+    solid: np.ndarray | None = None
 
     def centres_m(self) -> np.ndarray:
         """x, y of the cells' centres (rows x columns x 2)."""
@@ -25,7 +33,8 @@ class HeightMap:
         return self.origin_m + self.cell_size_m * np.stack([columns, rows], -1)
 
     def height_at(self, positions_m) -> np.ndarray:
-        """Heights (...) at positions (... x 2) by bilinear interpolation; NaN if one of the four cells around is outside or unknown."""
+        """Heights (...) at positions (... x 2) by bilinear interpolation; NaN if one of the four cells around is outside or
+        unknown."""
         cells = (np.asarray(positions_m, float) - self.origin_m) / self.cell_size_m
         with np.errstate(invalid="ignore"):
             low = np.floor(cells).astype(int)

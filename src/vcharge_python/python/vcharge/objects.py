@@ -13,40 +13,53 @@ CLASSES = ("unknown", "adult", "child", "car", "bicycle")
 FRAMES_HEADER = "stamp_ns,x_m,y_m,yaw_rad,num_objects"
 COVARIANCES = ("cov_x_x_m2", "cov_x_y_m2", "cov_x_vx_m2_per_s", "cov_x_vy_m2_per_s", "cov_y_y_m2", "cov_y_vx_m2_per_s",
                "cov_y_vy_m2_per_s", "cov_vx_vx_m2_per_s2", "cov_vx_vy_m2_per_s2", "cov_vy_vy_m2_per_s2")
-OBJECTS_HEADER = ("stamp_ns,id,class,class_probability,existence_probability,x_m,y_m,yaw_rad,vx_m_per_s,vy_m_per_s,is_standing,height_m,"
+OBJECTS_HEADER = ("stamp_ns,id,class,class_probability,existence_probability,x_m,y_m,yaw_rad,vx_m_per_s,vy_m_per_s,is_standing,"
+                  "height_m,"
                   + ",".join(COVARIANCES) + ",footprint_m")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TrackedObject:
-    """An object that can move, at one time, in the frame odom."""
+    """An object that can move, at one time, in the frame odom.
 
-    id: int  #: the same as long as the object is followed
-    object_class: str  #: "unknown", "adult", "child", "car" or "bicycle"
+    id: the same as long as the object is followed
+    object_class: "unknown", "adult", "child", "car" or "bicycle"
+    position_m: x, y of its middle
+    velocity_m_per_s: vx, vy over the ground, along the axes of odom
+    covariance: 4 x 4, of x, y, vx, vy
+    footprint_m: N x 2, convex, counter-clockwise
+    """
+
+    id: int
+    object_class: str
     class_probability: float
     existence_probability: float
-    position_m: np.ndarray  #: x, y of its middle
+    position_m: np.ndarray
     yaw_rad: float
-    velocity_m_per_s: np.ndarray  #: vx, vy over the ground, along the axes of odom
+    velocity_m_per_s: np.ndarray
     is_standing: bool
     height_m: float
-    covariance: np.ndarray  #: 4 x 4, of x, y, vx, vy
-    footprint_m: np.ndarray  #: N x 2, convex, counter-clockwise
+    covariance: np.ndarray
+    footprint_m: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ObjectFrame:
-    """The objects at one stamp."""
+    """The objects at one stamp.
+
+    odom_from_vehicle: 4 x 4, a pose on the ground
+    yaw_rad: that of odom_from_vehicle
+    """
 
     stamp_ns: int
-    odom_from_vehicle: np.ndarray  #: 4 x 4, a pose on the ground
-    yaw_rad: float  #: that of odom_from_vehicle
+    odom_from_vehicle: np.ndarray
+    yaw_rad: float
     objects: list[TrackedObject]
 
 
 def read_objects(path) -> list[ObjectFrame]:
-    """Reads objects.csv and objects_frames.csv. `path` is their folder, or objects.csv there. Frames have increasing stamps, also those
-    without objects. InputError naming file, line and column."""
+    """Reads objects.csv and objects_frames.csv. `path` is their folder, or objects.csv there. Frames have increasing stamps, also
+    those without objects. InputError naming file, line and column."""
     path = pathlib.Path(path)
     folder = path if path.is_dir() or path.suffix != ".csv" else path.parent
     frames_path, frames, counts = folder / "objects_frames.csv", {}, []

@@ -17,14 +17,21 @@ SCAN_HEADER = "name,origin_x_m,origin_y_m,max_range_m,angle_rad,range_m,free_m,r
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OccupancyGrid:
-    """Free and occupied cells on a regular grid: rows along y, columns along x."""
+    """Free and occupied cells on a regular grid: rows along y, columns along x.
 
-    state: np.ndarray  #: int8 (rows x columns): -1 unobserved, 0 free, 100 occupied
+    state: int8 (rows x columns): -1 unobserved, 0 free, 100 occupied
+    origin_m: x, y of the corner of the cell in row 0, column 0
+    stamp_ns: None for a grid without a time, such as drivable.yaml of a height map
+    frame_id: "odom" or "map"
+    fixed_from_vehicle: 4 x 4
+    """
+
+    state: np.ndarray
     cell_size_m: float
-    origin_m: np.ndarray  #: x, y of the corner of the cell in row 0, column 0
-    stamp_ns: int | None = None  #: None for a grid without a time, such as drivable.yaml of a height map
-    frame_id: str | None = None  #: "odom" or "map"
-    fixed_from_vehicle: np.ndarray | None = None  #: 4 x 4
+    origin_m: np.ndarray
+    stamp_ns: int | None = None
+    frame_id: str | None = None
+    fixed_from_vehicle: np.ndarray | None = None
 
     def centres_m(self) -> np.ndarray:
         """x, y of the cells' centres (rows x columns x 2)."""
@@ -34,34 +41,48 @@ class OccupancyGrid:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ObstacleMap(OccupancyGrid):
-    """An occupancy grid around the vehicle with what is known of each occupied cell. All arrays are rows x columns, float32."""
+    """An occupancy grid around the vehicle with what is known of each occupied cell. All arrays are rows x columns, float32.
 
-    point_m: np.ndarray | None = None  #: rows x columns x 2: the obstacle in an occupied cell, relative to origin_m; else NaN
-    point_sigma_m: np.ndarray | None = None  #: standard deviation of point_m
-    height_m: np.ndarray | None = None  #: above the ground; NaN where not occupied
+    point_m: rows x columns x 2: the obstacle in an occupied cell, relative to origin_m; else NaN
+    point_sigma_m: standard deviation of point_m
+    height_m: above the ground; NaN where not occupied
+    age_s: since the cell was last observed; NaN: never
+    """
+
+    point_m: np.ndarray | None = None
+    point_sigma_m: np.ndarray | None = None
+    height_m: np.ndarray | None = None
     height_sigma_m: np.ndarray | None = None
-    age_s: np.ndarray | None = None  #: since the cell was last observed; NaN: never
+    age_s: np.ndarray | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ObstacleScan:
-    """Nearest obstacles around a point on the ground, one per direction (N), in the vehicle's frame."""
+    """Nearest obstacles around a point on the ground, one per direction (N), in the vehicle's frame.
+
+    name: "fused", or the camera's name
+    origin_m: x, y
+    angle_rad: counter-clockwise from the vehicle's x axis
+    range_m: NaN if no obstacle is known, which does not mean free
+    free_m: the ray is observed to be free up to this range; 0: nothing is
+    height_m: of the obstacle above the ground; NaN without one
+    """
 
     stamp_ns: int
-    name: str  #: "fused", or the camera's name
-    origin_m: np.ndarray  #: x, y
+    name: str
+    origin_m: np.ndarray
     max_range_m: float
-    angle_rad: np.ndarray  #: counter-clockwise from the vehicle's x axis
-    range_m: np.ndarray  #: NaN if no obstacle is known, which does not mean free
-    free_m: np.ndarray  #: the ray is observed to be free up to this range; 0: nothing is
+    angle_rad: np.ndarray
+    range_m: np.ndarray
+    free_m: np.ndarray
     range_sigma_m: np.ndarray
-    height_m: np.ndarray  #: of the obstacle above the ground; NaN without one
+    height_m: np.ndarray
     height_sigma_m: np.ndarray
 
 
 def read_occupancy_grid(path) -> OccupancyGrid:
-    """Reads a YAML file and its image in the format of map_server, with the gray levels 0 (occupied), 205 (unobserved) and 254 (free).
-    InputError naming the file and the key."""
+    """Reads a YAML file and its image in the format of map_server, with the gray levels 0 (occupied), 205 (unobserved) and 254
+    (free). InputError naming the file and the key."""
     return OccupancyGrid(**_grid_of(pathlib.Path(path)))
 
 
@@ -94,7 +115,8 @@ def list_obstacle_maps(folder) -> list[int]:
 
 
 def read_obstacle_map(folder, stamp_ns: int) -> ObstacleMap:
-    """Reads FOLDER/<stamp_ns>.yaml and the images beside it. InputError naming the file that is missing, damaged or of another size."""
+    """Reads FOLDER/<stamp_ns>.yaml and the images beside it. InputError naming the file that is missing, damaged or of another
+    size."""
     stem = require_folder(folder, "obstacle maps") / str(int(stamp_ns))
     members = _grid_of(pathlib.Path(f"{stem}.yaml"))
     if "stamp_ns" not in members:

@@ -9,16 +9,24 @@ from vcharge.files import read_floats, read_gray, read_yaml, require_folder, sta
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RangeMap:
-    """Distance along the ray of each pixel of a working camera, a Mei camera without distortion. All arrays are height x width."""
+    """Distance along the ray of each pixel of a working camera, a Mei camera without distortion. All arrays are height x width.
+
+    frame_id: optical frame of the camera
+    camera: pixel to ray
+    range_m: float32, metres along the ray, not depth along the axis; NaN where unknown
+    standard_deviation_m: float32; NaN where unknown
+    confidence: float32 from 0 (no support) to 1; 0 where unknown
+    reference: uint8, the camera's image; None if it was not kept
+    """
 
     stamp_ns: int
     camera_name: str
-    frame_id: str  #: optical frame of the camera
-    camera: MeiCamera  #: pixel to ray
-    range_m: np.ndarray  #: float32, metres along the ray, not depth along the axis; NaN where unknown
-    standard_deviation_m: np.ndarray  #: float32; NaN where unknown
-    confidence: np.ndarray  #: float32 from 0 (no support) to 1; 0 where unknown
-    reference: np.ndarray | None = None  #: uint8, the camera's image; None if it was not kept
+    frame_id: str
+    camera: MeiCamera
+    range_m: np.ndarray
+    standard_deviation_m: np.ndarray
+    confidence: np.ndarray
+    reference: np.ndarray | None = None
 
     def rays(self) -> np.ndarray:
         """Unit rays of the pixels (height x width x 3) in the camera's frame; NaN where a pixel has none."""
@@ -42,8 +50,8 @@ def list_range_maps(folder, camera: str) -> list[int]:
 
 
 def read_range_map(folder, camera: str, stamp_ns: int) -> RangeMap:
-    """Reads FOLDER/<camera>/<stamp_ns>.yaml and the images beside it. InputError naming the file, for a missing key, a missing or damaged
-    image, or images of different sizes."""
+    """Reads FOLDER/<camera>/<stamp_ns>.yaml and the images beside it. InputError naming the file, for a missing key, a missing or
+    damaged image, or images of different sizes."""
     stem = require_folder(folder, "range maps") / camera / str(int(stamp_ns))
     top = read_yaml(f"{stem}.yaml")
     frame_id, mei = top.required("frame_id").text(), top.required("mei")

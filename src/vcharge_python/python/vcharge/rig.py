@@ -17,21 +17,32 @@ DIRECTIONS = ("down", "up", "right", "left")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Camera:
-    """One camera of a rig."""
+    """One camera of a rig.
+
+    image_size_px: width, height
+    field_of_view_rad: pixels whose ray leaves this cone (full angle) are not used
+    mask: uint8 (height x width), 0 where the vehicle itself is seen; None without a mask
+    vehicle_from_camera: 4 x 4; None before extrinsic calibration
+    covariance: of vehicle_from_camera, 6 x 6 over [dt, dphi] in the vehicle's frame (m, rad), or None
+    focal_sigma: relative; 0: unknown
+    principal_point_sigma_px: 0: unknown
+    readout_s: between the first and the last line of an image
+    clock_offset_s: the vehicle's clock minus the camera's
+    """
 
     name: str
     frame_id: str
-    image_size_px: tuple[int, int]  #: width, height
+    image_size_px: tuple[int, int]
     model: CameraModel
-    field_of_view_rad: float = math.pi  #: pixels whose ray leaves this cone (full angle) are not used
-    mask: np.ndarray | None = dataclasses.field(default=None, repr=False)  #: uint8 (height x width), 0 where the vehicle itself is seen; None without a mask
-    vehicle_from_camera: np.ndarray | None = None  #: 4 x 4; None before extrinsic calibration
-    covariance: np.ndarray | None = None  #: of vehicle_from_camera, 6 x 6 over [dt, dphi] in the vehicle's frame (m, rad), or None
-    focal_sigma: float = 0.0  #: relative; 0: unknown
-    principal_point_sigma_px: float = 0.0  #: 0: unknown
-    readout_s: float = 0.0  #: between the first and the last line of an image
+    field_of_view_rad: float = math.pi
+    mask: np.ndarray | None = dataclasses.field(default=None, repr=False)
+    vehicle_from_camera: np.ndarray | None = None
+    covariance: np.ndarray | None = None
+    focal_sigma: float = 0.0
+    principal_point_sigma_px: float = 0.0
+    readout_s: float = 0.0
     readout_direction: str = "down"
-    clock_offset_s: float = 0.0  #: the vehicle's clock minus the camera's
+    clock_offset_s: float = 0.0
 
     @property
     def intrinsics(self) -> dict[str, float]:
@@ -39,8 +50,8 @@ class Camera:
         return self.model.parameters
 
     def project(self, points_in_camera) -> np.ndarray:
-        """Pixels (... x 2) of points (... x 3, m) in the camera's frame; NaN where the lens has no image of the point. Pixels can lie
-        outside the image."""
+        """Pixels (... x 2) of points (... x 3, m) in the camera's frame; NaN where the lens has no image of the point. Pixels can
+        lie outside the image."""
         return self.model.project(points_in_camera)
 
     def unproject(self, pixels) -> np.ndarray:
@@ -56,12 +67,16 @@ class Camera:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Rig:
-    """The cameras of a vehicle, by name, in the order of rig.yaml."""
+    """The cameras of a vehicle, by name, in the order of rig.yaml.
+
+    scale_sigma: relative standard deviation of the scale that all translations have in common; 0: unknown
+    stamp_tolerance_s: images whose stamps differ by at most this are one frame
+    """
 
     cameras: dict[str, Camera]
     vehicle_frame: str = "base_link"
-    scale_sigma: float = 0.0  #: relative standard deviation of the scale that all translations have in common; 0: unknown
-    stamp_tolerance_s: float = 0.0  #: images whose stamps differ by at most this are one frame
+    scale_sigma: float = 0.0
+    stamp_tolerance_s: float = 0.0
     provenance: dict[str, str] = dataclasses.field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Camera:

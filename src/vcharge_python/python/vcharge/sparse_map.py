@@ -18,23 +18,36 @@ OLDEST_SCHEMA, SCHEMA = 2, 3
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Session:
-    """One drive in a map."""
+    """One drive in a map.
 
-    name: str  #: of the recording; empty if unknown
-    recording_hash: str  #: of the recording's file; empty if unknown
-    component: int  #: sessions with one number were joined; the relative pose of components is unknown
+    name: of the recording; empty if unknown
+    recording_hash: of the recording's file; empty if unknown
+    component: sessions with one number were joined; the relative pose of components is unknown
+    """
+
+    name: str
+    recording_hash: str
+    component: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Keyframes:
-    """Poses of the vehicle whose images are part of the map, grouped by session, ordered by id. K of them."""
+    """Poses of the vehicle whose images are part of the map, grouped by session, ordered by id. K of them.
 
-    ids: np.ndarray  #: int64 (K), the same in all versions of a map
-    sessions: np.ndarray  #: int64 (K), indices into the map's sessions
-    stamps_ns: np.ndarray  #: int64 (K), increasing within a session
-    positions_m: np.ndarray  #: K x 3, in the frame map
-    rotations_xyzw: np.ndarray  #: K x 4, unit quaternions of map_from_vehicle
-    covariances: np.ndarray  #: K x 6 x 6 over [dt, dphi] in the frame map (m, rad); NaN if unknown
+    ids: int64 (K), the same in all versions of a map
+    sessions: int64 (K), indices into the map's sessions
+    stamps_ns: int64 (K), increasing within a session
+    positions_m: K x 3, in the frame map
+    rotations_xyzw: K x 4, unit quaternions of map_from_vehicle
+    covariances: K x 6 x 6 over [dt, dphi] in the frame map (m, rad); NaN if unknown
+    """
+
+    ids: np.ndarray
+    sessions: np.ndarray
+    stamps_ns: np.ndarray
+    positions_m: np.ndarray
+    rotations_xyzw: np.ndarray
+    covariances: np.ndarray
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -47,13 +60,20 @@ class Keyframes:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Landmarks:
-    """Points, ordered by id. L of them."""
+    """Points, ordered by id. L of them.
 
-    ids: np.ndarray  #: int64 (L), the same in all versions of a map
-    positions_m: np.ndarray  #: L x 3, in the frame map
-    covariances_m2: np.ndarray  #: L x 3 x 3; NaN if unknown
-    presence_log_odds: np.ndarray  #: L, evidence of later drives that the point is still there; 0 without any
-    num_observations: np.ndarray  #: int64 (L), at least 1
+    ids: int64 (L), the same in all versions of a map
+    positions_m: L x 3, in the frame map
+    covariances_m2: L x 3 x 3; NaN if unknown
+    presence_log_odds: L, evidence of later drives that the point is still there; 0 without any
+    num_observations: int64 (L), at least 1
+    """
+
+    ids: np.ndarray
+    positions_m: np.ndarray
+    covariances_m2: np.ndarray
+    presence_log_odds: np.ndarray
+    num_observations: np.ndarray
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -61,12 +81,18 @@ class Landmarks:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Observations:
-    """Landmarks seen in images, ordered by keyframe and camera. O of them."""
+    """Landmarks seen in images, ordered by keyframe and camera. O of them.
 
-    keyframes: np.ndarray  #: int32 (O), indices into the map's keyframes
-    cameras: np.ndarray  #: int32 (O), indices into the rig's cameras
-    landmarks: np.ndarray  #: int32 (O), indices into the map's landmarks
-    positions_px: np.ndarray  #: float32 (O x 2)
+    keyframes: int32 (O), indices into the map's keyframes
+    cameras: int32 (O), indices into the rig's cameras
+    landmarks: int32 (O), indices into the map's landmarks
+    positions_px: float32 (O x 2)
+    """
+
+    keyframes: np.ndarray
+    cameras: np.ndarray
+    landmarks: np.ndarray
+    positions_px: np.ndarray
 
     def __len__(self) -> int:
         return len(self.keyframes)
@@ -74,16 +100,21 @@ class Observations:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SparseMap:
-    """A metric map of landmarks. Its frame is the vehicle's at the first keyframe, unless the map was moved."""
+    """A metric map of landmarks. Its frame is the vehicle's at the first keyframe, unless the map was moved.
+
+    version: the version that was read
+    versions: the versions that the file holds; the newest is the map
+    provenance: how the map was made, by keys such as "program" and "bag"
+    """
 
     rig: Rig
     sessions: list[Session]
     keyframes: Keyframes
     landmarks: Landmarks
     observations: Observations
-    version: int  #: the version that was read
-    versions: list[int]  #: the versions that the file holds; the newest is the map
-    provenance: dict[str, str]  #: how the map was made, by keys such as "program" and "bag"
+    version: int
+    versions: list[int]
+    provenance: dict[str, str]
 
     @property
     def components(self) -> np.ndarray:
@@ -98,9 +129,9 @@ class SparseMap:
 
 
 def read_map(path, version: int | None = None) -> SparseMap:
-    """Reads a sparse map: the newest version, or an earlier one that the file still holds. InputError naming the file for what is no map,
-    is truncated or damaged, or has a file format that is not read. SQLite's check of its pages and all relations between the tables are
-    checked; the hash of the content is not."""
+    """Reads a sparse map: the newest version, or an earlier one that the file still holds. InputError naming the file for what is
+    no map, is truncated or damaged, or has a file format that is not read. SQLite's check of its pages and all relations between
+    the tables are checked; the hash of the content is not."""
     path = pathlib.Path(path)
     schema = check_header(path)
     try:
@@ -168,8 +199,9 @@ class _Reader:
     def rows(self, table, columns, rest=""):
         source = table
         if self.version != self.versions[-1]:
-            source = (f"(SELECT {columns} FROM {table} WHERE since_version <= {self.version} UNION ALL SELECT {columns} FROM past_{table} "
-                      f"WHERE since_version <= {self.version} AND until_version >= {self.version})")
+            source = (f"(SELECT {columns} FROM {table} WHERE since_version <= {self.version} UNION ALL "
+                      f"SELECT {columns} FROM past_{table} WHERE since_version <= {self.version} "
+                      f"AND until_version >= {self.version})")
         return self.database.execute(f"SELECT {columns} FROM {source} {rest}").fetchall()
 
     def read(self):
@@ -185,7 +217,8 @@ class _Reader:
             self.damaged("a landmark without an observation")
         if len(keyframes) and not (keyframes.sessions.min() >= 0 and keyframes.sessions.max() < len(sessions)):
             self.damaged("keyframe: there is no such session")
-        return SparseMap(rig, sessions, keyframes, Landmarks(*landmarks, counts), observations, self.version, self.versions, provenance)
+        return SparseMap(rig, sessions, keyframes, Landmarks(*landmarks, counts), observations, self.version, self.versions,
+                         provenance)
 
     def rig(self):
         text = dict(self.rows("meta", "key, value")).get("rig")
@@ -214,7 +247,8 @@ class _Reader:
 
     def landmarks(self):
         """The members of Landmarks apart from the counts."""
-        rows = self.rows("landmark", "id, x_m, y_m, z_m, covariance_3x3_f64, " + ("presence_log_odds" if self.has_versions else "0"),
+        rows = self.rows("landmark",
+                         "id, x_m, y_m, z_m, covariance_3x3_f64, " + ("presence_log_odds" if self.has_versions else "0"),
                          "ORDER BY id")
         positions = np.array([row[1:4] for row in rows], float).reshape(-1, 3)
         if not np.isfinite(positions).all():

@@ -15,11 +15,16 @@ TIME = re.compile(r"(-?)(\d{1,10})(?:\.(\d{0,9}))?")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Poses of the vehicle in a world frame (map, odom or that of the truth), by increasing stamps."""
+    """Poses of the vehicle in a world frame (map, odom or that of the truth), by increasing stamps.
 
-    stamps_ns: np.ndarray  #: int64 (N)
-    positions_m: np.ndarray  #: N x 3
-    rotations_xyzw: np.ndarray  #: N x 4, world_from_vehicle, as written
+    stamps_ns: int64 (N)
+    positions_m: N x 3
+    rotations_xyzw: N x 4, world_from_vehicle, as written
+    """
+
+    stamps_ns: np.ndarray
+    positions_m: np.ndarray
+    rotations_xyzw: np.ndarray
 
     def __len__(self) -> int:
         return len(self.stamps_ns)
@@ -41,8 +46,8 @@ class Trajectory:
 
 
 def read_trajectory(path) -> Trajectory:
-    """Reads lines 'time_s tx ty tz qx qy qz qw'; '#' starts a comment. InputError naming the line for other lines, stamps that do not
-    increase, quaternions whose norm differs from 1 by more than 1e-3, or a file without poses."""
+    """Reads lines 'time_s tx ty tz qx qy qz qw'; '#' starts a comment. InputError naming the line for other lines, stamps that do
+    not increase, quaternions whose norm differs from 1 by more than 1e-3, or a file without poses."""
     stamps, values = [], []
     for number, line in enumerate(read_text(path).split("\n"), 1):
         fields = line.split("#")[0].split()

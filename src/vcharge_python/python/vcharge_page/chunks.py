@@ -10,7 +10,8 @@ LARGEST = 32767
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Chunk:
-    """Points in a box: `packed` is int16 (N x 4): x, y, z from the box's lower to its upper end, and a value, as -32767 to 32767."""
+    """Points in a box: `packed` is int16 (N x 4): x, y, z from the box's lower to its upper end, and a value, as -32767 to
+    32767."""
     centre_m: np.ndarray
     half_size_m: np.ndarray
     packed: np.ndarray
@@ -21,8 +22,8 @@ class Chunk:
 
 
 def chunks_of(points_m, values, max_points=MAX_POINTS):
-    """Chunks of points (N x 3) with values from 0 to 1 (N). Octants are split until they hold at most `max_points`; within a chunk the
-    order is random."""
+    """Chunks of points (N x 3) with values from 0 to 1 (N). Octants are split until they hold at most `max_points`; within a chunk
+    the order is random."""
     points = np.asarray(points_m, float).reshape(-1, 3)
     if not len(points):
         return []

@@ -27,20 +27,21 @@ class NearStamps:
 
 
 def pictures_of(sparse_map: SparseMap, rig: Rig, bag, width_px):
-    """JPEG files of the keyframes, by stamp (ns) and camera; of every second, third, ... keyframe if all would be too large. InputError if the
-    bag has no image of a keyframe."""
+    """JPEG files of the keyframes, by stamp (ns) and camera; of every second, third, ... keyframe if all would be too large.
+    InputError if the bag has no image of a keyframe."""
     stamps = NearStamps(sparse_map.keyframes.stamps_ns, round(rig.stamp_tolerance_s * 1e9))
     found, told = {}, 0
     for stamp, camera, image in read_images(bag, list(rig.cameras), stamps):
         scale = min(1.0, width_px / image.shape[1])
         small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-        found.setdefault(stamps.nearest(stamp), {})[camera] = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+        jpeg = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+        found.setdefault(stamps.nearest(stamp), {})[camera] = jpeg.tobytes()
         if len(found) > told:
             told = len(found)
             print(f"\rimages of {told} keyframes", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     if not found:
-        raise InputError(f"{bag}: expected images of the cameras {', '.join(rig.cameras)} at stamps of the map's keyframes: is it the drive "
-                         "that was mapped?")
+        raise InputError(f"{bag}: expected images of the cameras {', '.join(rig.cameras)} at stamps of the map's keyframes: "
+                         "is it the drive that was mapped?")
     step = -(-sum(len(jpeg) for images in found.values() for jpeg in images.values()) // MAX_BYTES)
     return {stamp: found[stamp] for stamp in sorted(found)[::step]}

@@ -26,7 +26,8 @@ def rounded(values, digits=3):
 def points_block(points_m, values):
     """Descriptions of the chunks of points, and their bytes one after the other."""
     chunks = chunks_of(points_m, values)
-    return ([{"centreM": rounded(one.centre_m, 6), "halfM": rounded(one.half_size_m, 6), "count": len(one.packed)} for one in chunks],
+    return ([{"centreM": rounded(one.centre_m, 6), "halfM": rounded(one.half_size_m, 6), "count": len(one.packed)}
+             for one in chunks],
             b"".join(one.packed.astype("<i2").tobytes() for one in chunks))
 
 
@@ -38,7 +39,8 @@ def scene_of(title: str, sparse_map: SparseMap, height_map: HeightMap | None = N
                                   np.log1p(sparse_map.landmarks.num_observations) / np.log1p(MANY_OBSERVATIONS))
     blocks = {"points": points}
     description = {"title": title, "numLandmarks": len(sparse_map.landmarks), "chunks": chunks, "cameras": _cameras(sparse_map),
-                   "sessions": _sessions(sparse_map, timeline), "numComponents": len({one.component for one in sparse_map.sessions}),
+                   "sessions": _sessions(sparse_map, timeline),
+                   "numComponents": len({one.component for one in sparse_map.sessions}),
                    "view": _view(sparse_map), "program": sparse_map.provenance.get("program", "")}
     surface = surface_of(height_map) if height_map else None
     if surface:

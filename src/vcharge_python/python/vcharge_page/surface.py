@@ -11,8 +11,8 @@ UNKNOWN, LARGEST = -32768, 32767
 
 
 def surface_of(height_map: HeightMap):
-    """A grid of heights, and a JPEG of the same area, whose rows go along y: (description for the page, int16 rows x columns, bytes).
-    None for a map without a known cell."""
+    """A grid of heights, and a JPEG of the same area, whose rows go along y: (description for the page, int16 rows x columns,
+    bytes). None for a map without a known cell."""
     rows, columns = np.nonzero(np.isfinite(height_map.height_m))
     if not len(rows):
         return None
@@ -30,8 +30,8 @@ def surface_of(height_map: HeightMap):
     done, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     assert done
     # The mean of a block belongs to the block's middle; the last blocks may reach over the edge.
-    return {"originM": (corner + 0.5 * step * cell).tolist(), "cellM": step * cell, "rows": coarse.shape[0], "columns": coarse.shape[1],
-            "lowM": low, "highM": high, "pictureCornerM": corner.tolist(),
+    return {"originM": (corner + 0.5 * step * cell).tolist(), "cellM": step * cell, "rows": coarse.shape[0],
+            "columns": coarse.shape[1], "lowM": low, "highM": high, "pictureCornerM": corner.tolist(),
             "pictureSizeM": [heights.shape[1] * cell, heights.shape[0] * cell]}, packed.astype(np.int16), jpeg.tobytes()
 
 

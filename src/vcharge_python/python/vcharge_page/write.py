@@ -57,11 +57,13 @@ def viewer_text():
 def page_text(scene: Scene) -> str:
     """The HTML file."""
     check_viewer()
-    blocks = "\n".join(f'<script type="text/plain" id="block-{name}">{text_of(block)}</script>' for name, block in scene.blocks.items())
+    blocks = "\n".join(f'<script type="text/plain" id="block-{name}">{text_of(block)}</script>'
+                       for name, block in scene.blocks.items())
     # "<" would end the element early.
     description = json.dumps(scene.description, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return PAGE.format(policy=POLICY, title=html.escape(scene.description["title"]),
-                       style=(VIEWER / "style.css").read_text(encoding="utf-8"), body=(VIEWER / "body.html").read_text(encoding="utf-8"),
+                       style=(VIEWER / "style.css").read_text(encoding="utf-8"),
+                       body=(VIEWER / "body.html").read_text(encoding="utf-8"),
                        scene=description, blocks=blocks, licence=(VIEWER / "three_licence.txt").read_text(encoding="utf-8"),
                        three=THREE.read_text(encoding="utf-8").replace("</script", "<\\/script"), viewer=viewer_text())
 

@@ -30,7 +30,8 @@ export class Drive {
 
   /** A small arrow on the ground. */
   tick(position, rotation) {
-    const at = (x, y) => new THREE.Vector3(x, y, ABOVE_GROUND_M).applyQuaternion(rotation).add(new THREE.Vector3(...position)).toArray();
+    const origin = new THREE.Vector3(...position);
+    const at = (x, y) => new THREE.Vector3(x, y, ABOVE_GROUND_M).applyQuaternion(rotation).add(origin).toArray();
     return [at(-0.25, 0.2), at(0.35, 0), at(0.35, 0), at(-0.25, -0.2)];
   }
 
@@ -59,7 +60,8 @@ export function carOf(cameras) {
   const length_m = CAR.front_m - CAR.rear_m;
   const body = new THREE.BoxGeometry(length_m, CAR.width_m, CAR.height_m);
   body.translate(CAR.front_m - 0.5 * length_m, 0, 0.5 * CAR.height_m);
-  car.add(new THREE.Mesh(body, new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.25, depthWrite: false})));
+  const glass = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.25, depthWrite: false});
+  car.add(new THREE.Mesh(body, glass));
   car.add(new THREE.LineSegments(new THREE.EdgesGeometry(body), new THREE.LineBasicMaterial({color: 0xffffff})));
   for (const camera of cameras) {
     const s = CAMERA_SIZE_M, corners = [[-s, -s, s], [s, -s, s], [s, s, s], [-s, s, s]];

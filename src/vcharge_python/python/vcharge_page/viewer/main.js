@@ -74,7 +74,8 @@ class Page {
     this.scene.add(this.measure.group);
     this.bar = new TimeBar(this.drives, (number, time_s) => this.showTime(number, time_s));
     document.getElementById("title").textContent = given.title;
-    const parts = given.numComponents > 1 ? ` Its ${given.numComponents} parts were not joined: how they lie to each other is unknown.` : "";
+    const parts = given.numComponents > 1 ?
+        ` Its ${given.numComponents} parts were not joined: how they lie to each other is unknown.` : "";
     document.getElementById("counts").textContent = `${given.numLandmarks} landmarks, ` +
         `${given.sessions.reduce((sum, session) => sum + session.timesS.length, 0)} keyframes.${parts}`;
   }
@@ -84,7 +85,8 @@ class Page {
     document.getElementById("top").addEventListener("click", () => this.view.lookFromAbove());
     document.getElementById("whole").addEventListener("click", () => this.showAll());
     this.canvas.addEventListener("dblclick", (event) => {
-      const point = this.find(2 * event.clientX / this.canvas.clientWidth - 1, 1 - 2 * event.clientY / this.canvas.clientHeight, 0.03);
+      const {clientWidth, clientHeight} = this.canvas;
+      const point = this.find(2 * event.clientX / clientWidth - 1, 1 - 2 * event.clientY / clientHeight, 0.03);
       if (point) {
         this.view.lookAt(point);
       }

@@ -66,7 +66,8 @@ export class Measure {
       const [from, to] = this.points;
       this.show(linesOf([from.toArray(), to.toArray()], 0xffffff));
       const flat_m = Math.hypot(to.x - from.x, to.y - from.y);
-      this.tell(`${from.distanceTo(to).toFixed(2)} m (over the ground ${flat_m.toFixed(2)} m, height ${(to.z - from.z).toFixed(2)} m)`);
+      this.tell(`${from.distanceTo(to).toFixed(2)} m (over the ground ${flat_m.toFixed(2)} m, ` +
+                `height ${(to.z - from.z).toFixed(2)} m)`);
     }
     this.onChange();
   }

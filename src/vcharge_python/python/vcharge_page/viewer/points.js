@@ -106,7 +106,8 @@ export class Points {
         }
         if (Math.hypot((point.x / point.w - x) * aspect, point.y / point.w - y) < radius) {
           nearest = point.w;
-          best = new THREE.Vector3(packed[k], packed[k + 1], packed[k + 2]).divideScalar(LARGEST).multiply(chunk.half).add(chunk.centre);
+          best = new THREE.Vector3(packed[k], packed[k + 1], packed[k + 2]).divideScalar(LARGEST);
+          best.multiply(chunk.half).add(chunk.centre);
         }
       }
     }

@@ -4,7 +4,7 @@ const UNKNOWN = -32768, LARGEST = 32767;
 const COARSE_STEP = 4;  // of the cells that are drawn while the view of a slow computer moves
 
 export class Surface {
-  /** `given`: the description; `bytes`: heights, int16, rows along y; `address`: the picture; `onLoad` is called once it is there. */
+  /** `given`: the description; `bytes`: heights, int16, rows along y; `address`: of the picture, after which `onLoad` is called. */
   constructor(given, bytes, address, onLoad) {
     this.given = given;
     const packed = new Int16Array(bytes.buffer, bytes.byteOffset, given.rows * given.columns);
