@@ -61,7 +61,7 @@ def _seconds(stamp_ns, session, timeline):
 
 
 def _sessions(sparse_map, timeline):
-    return [{"name": found.name or f"drive {number + 1}", "component": found.component,
+    return [{"name": f"{number + 1} {found.name}".rstrip(), "component": found.component,
              "timesS": [_seconds(stamp, number, timeline) for stamp in one.stamps_ns], "positionsM": rounded(one.positions_m),
              "rotationsXyzw": rounded(one.rotations_xyzw, 6)}
             for number, (found, one) in enumerate(zip(sparse_map.sessions, timeline.trajectories))]
