@@ -7,8 +7,10 @@ namespace vcharge {
 namespace {
 
 constexpr double kMargin_m = 1.0;  // ground at this distance from the vehicle is stored
-constexpr int kMinCompared = 500;  // cells from which the change of the brightness is found
-constexpr float kFollow = 0.3F;    // part of a change that one frame takes over
+constexpr double kKeep_s = 5.0;    // a cell is not stored again within this time
+constexpr int kCompareStep = 4;    // distance of cells from which the change of the brightness is found
+constexpr size_t kMinCompared = 200;
+constexpr float kFollow = 0.3F;  // part of a change that one frame takes over
 constexpr float kMaxStep = 2.0F;
 constexpr float kFraction = 256.0F;
 
@@ -32,8 +34,8 @@ void GroundMemory::clear() {
   brightness_ = 1.0F;
 }
 
-void GroundMemory::store(const cv::Mat& image, const cv::Mat& labels, const cv::Mat& is_hidden,
-                         const RigidTransform& odom_from_vehicle) {
+void GroundMemory::store(Timestamp stamp, const cv::Mat& image, const cv::Mat& labels,
+                         const cv::Mat& is_hidden, const RigidTransform& odom_from_vehicle) {
   const double pixel_m = grid_.pixel_m();
   const double yaw_rad = yawOfRotation(odom_from_vehicle.rotation());
   const Eigen::Vector2d origin_m = odom_from_vehicle.translation().head<2>();
@@ -51,8 +53,7 @@ void GroundMemory::store(const cv::Mat& image, const cv::Mat& labels, const cv::
   }
   const Eigen::Array2i low = (low_m / pixel_m).ceil().cast<int>(),
                        high = (high_m / pixel_m).floor().cast<int>();
-  double sum_new = 0.0, sum_old = 0.0;
-  int num_compared = 0;
+  ratios_.clear();
   const int first_column = region_.x, last_column = region_.x + region_.width - 1;
   const int first_row = region_.y, last_row = region_.y + region_.height - 1;
   for (int y = low.y(); y <= high.y(); ++y) {
@@ -81,18 +82,23 @@ void GroundMemory::store(const cv::Mat& image, const cv::Mat& labels, const cv::
       Cell& cell = at(x, y);
       const uint16_t tile = tileOf(x, y);
       if (cell.gray != 0 && cell.tile == tile) {
-        sum_new += gray;
-        sum_old += brightness_ * static_cast<float>(cell.gray) / kFraction;
-        ++num_compared;
+        if (x % kCompareStep == 0 && y % kCompareStep == 0) {
+          ratios_.push_back(gray * kFraction / (brightness_ * static_cast<float>(cell.gray)));
+        }
+        if (std::abs(toSeconds(stamp - cell.stamp)) < kKeep_s) {
+          continue;
+        }
       }
       cell.gray = static_cast<uint16_t>(std::clamp(kFraction * gray / brightness_, 1.0F, 65535.0F));
       cell.tile = tile;
+      cell.stamp = stamp;
     }
   }
-  if (num_compared >= kMinCompared) {
-    const auto ratio = static_cast<float>(sum_new / sum_old);
-    brightness_ = std::clamp(brightness_ * std::pow(std::clamp(ratio, 1.0F / kMaxStep, kMaxStep), kFollow),
-                             0.1F, 10.0F);
+  if (ratios_.size() >= kMinCompared) {
+    const auto middle = ratios_.begin() + static_cast<std::ptrdiff_t>(ratios_.size() / 2);
+    std::nth_element(ratios_.begin(), middle, ratios_.end());
+    const float step = std::pow(std::clamp(*middle, 1.0F / kMaxStep, kMaxStep), kFollow);
+    brightness_ = std::clamp(brightness_ * step, 0.1F, 10.0F);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "surround_view/view_grid.h"
+#include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -18,9 +19,10 @@ class GroundMemory {
 
   void clear();
 
-  /// Stores the ground around the vehicle that the cameras show. `labels` as in SurroundFrame; `is_hidden`,
-  /// one per block of kSurroundBlock_px: not 0 where obstacles are shown instead.
-  void store(const cv::Mat& image, const cv::Mat& labels, const cv::Mat& is_hidden,
+  /// Stores the ground around the vehicle that the cameras show. What was seen within the last seconds stays
+  /// as it was: the vehicle's shadow may have come over it. `labels` as in SurroundFrame; `is_hidden`, one
+  /// per block of kSurroundBlock_px: not 0 where obstacles are shown instead.
+  void store(Timestamp stamp, const cv::Mat& image, const cv::Mat& labels, const cv::Mat& is_hidden,
              const RigidTransform& odom_from_vehicle);
 
   /// Fills unknown pixels around the vehicle with ground that was stored, and labels them.
@@ -30,6 +32,7 @@ class GroundMemory {
   struct Cell {
     uint16_t gray = 0;  // in 256ths of a gray level, divided by the memory's brightness; 0: unknown
     uint16_t tile = 0;  // tile of the plane that the cell is in: cells repeat in every tile
+    Timestamp stamp;    // of the image
   };
   /// Cell of an integer position on the plane, in units of pixels.
   Cell& at(int x, int y) {
@@ -46,6 +49,8 @@ class GroundMemory {
   int tile_bits_ = 0, mask_ = 0;
   std::vector<Cell> cells_;
   float brightness_ = 1.0F;  // of the last image, over that of what is stored
+  std::vector<float>
+      ratios_;  // of the brightness of an image over that of the memory; kept to avoid allocations
 };
 
 }  // namespace vcharge

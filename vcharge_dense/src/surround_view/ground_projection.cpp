@@ -1,19 +1,25 @@
 #include "surround_view/ground_projection.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include <Eigen/LU>
+#include <opencv2/imgproc.hpp>
 
 #include "kernels/parallel_rows.h"
 #include "surround_view/image_pyramid.h"
+#include "vcharge_core/camera/pixel_angle.h"
 #include "vcharge_core/motion/cross_matrix.h"
 
 namespace vcharge {
 namespace {
 
 constexpr double kPixelSigma_px = 0.5;
+// Margins of the field of view and of masks: lenses blur what lies beyond them into the image.
+constexpr double kRim_px = 6.0;
+constexpr int kMaskMargin_px = 3;
 constexpr double kStep_m = 0.005;               // for derivatives of the projection
 constexpr double kLeastPixelsPerMetre2 = 1e-6;  // the surface is seen edge-on below
 
@@ -27,10 +33,19 @@ class ViewCamera {
         camera_(rig.cameras[camera_index]),
         camera_from_vehicle_(camera_.vehicle_from_camera->inverse()),
         covariance_(rig.covarianceWithScale(camera_index)),
-        min_cos_angle_(std::cos(0.5 * camera_.field_of_view_rad)),
         masks_(camera_.image_size_px) {
-    masks_.set(camera_.mask.empty() ? cv::Mat(camera_.image_size_px, CV_8UC1, cv::Scalar(255))
-                                    : cv::Mat(camera_.mask != 0));
+    const double pixel_rad = radiansPerPixel(camera_);
+    for (int level = 0; level < ImagePyramid::kNumLevels; ++level) {
+      // All four pixels of a sample must lie inside.
+      min_cos_angles_[static_cast<size_t>(level)] =
+          std::cos(0.5 * camera_.field_of_view_rad - (kRim_px + 1.5 * (1 << level)) * pixel_rad);
+    }
+    cv::Mat mask(camera_.image_size_px, CV_8UC1, cv::Scalar(255));
+    if (!camera_.mask.empty()) {
+      constexpr int kWidth_px = 2 * kMaskMargin_px + 1;
+      cv::erode(camera_.mask != 0, mask, cv::Mat::ones(kWidth_px, kWidth_px, CV_8UC1));
+    }
+    masks_.set(mask);
   }
 
   /// Fills one pixel of the tables unless the camera does not see it.
@@ -58,14 +73,15 @@ class ViewCamera {
         (grid_.height_m(position_m + Eigen::Vector2d(0.0, kStep_m)) - point.z()) / kStep_m;
     const Eigen::Matrix2d pixel_by_position = pixel_by_point * point_by_position;
     const double area = std::abs(pixel_by_position.determinant());
-    if (!(area > kLeastPixelsPerMetre2) || !find(pixel, std::sqrt(area) * grid_.pixel_m(), position)) {
+    const Eigen::Vector3d in_camera = camera_from_vehicle_ * point;
+    if (!(area > kLeastPixelsPerMetre2) ||
+        !find(pixel, std::sqrt(area) * grid_.pixel_m(), in_camera.normalized().z(), position)) {
       return;
     }
     const Eigen::Matrix2d position_by_pixel = pixel_by_position.inverse();
     const Eigen::Matrix2d covariance =
         position_by_pixel * pixelCovariance(point, pixel_by_point) * position_by_pixel.transpose();
     *sigma_m = static_cast<float>(std::sqrt(covariance.trace()));
-    const Eigen::Vector3d in_camera = camera_from_vehicle_ * point;
     const double angle_rad = std::atan2(in_camera.head<2>().norm(), in_camera.z());
     *angle = static_cast<uint8_t>(angle_rad / M_PI * kAngleSteps + 0.5);
   }
@@ -73,7 +89,7 @@ class ViewCamera {
  private:
   bool project(const Eigen::Vector3d& point_in_vehicle, Eigen::Vector2d* pixel) const {
     const Eigen::Vector3d point = camera_from_vehicle_ * point_in_vehicle;
-    return point.z() >= min_cos_angle_ * point.norm() && camera_.model.project(point, pixel);
+    return point.z() >= min_cos_angles_[0] * point.norm() && camera_.model.project(point, pixel);
   }
 
   Eigen::Matrix2d pixelCovariance(const Eigen::Vector3d& point, const Projection& pixel_by_point) const {
@@ -88,16 +104,18 @@ class ViewCamera {
     return covariance;
   }
 
-  /// The position in the level whose pixels are about as large as those of the view; false outside the image
-  /// and the mask.
-  bool find(const Eigen::Vector2d& pixel, double source_px, PyramidPosition* position) const {
+  /// The position in the level whose pixels are about as large as those of the view; false outside the image,
+  /// the field of view and the mask.
+  bool find(const Eigen::Vector2d& pixel, double source_px, double cos_angle,
+            PyramidPosition* position) const {
     const int level = std::clamp(static_cast<int>(std::lround(std::log2(std::max(source_px, 1.0)))), 0,
                                  ImagePyramid::kNumLevels - 1);
     const Eigen::Vector2d in_level =
         (pixel.array() + 0.5) / (1 << level) - 0.5 + 0.5 / 256.0;  // rounds the weights
     const double column = std::floor(in_level.x()), row = std::floor(in_level.y());
     const cv::Rect& rect = masks_.rect(level);
-    if (!(column >= 0.0 && row >= 0.0 && column < rect.width - 1 && row < rect.height - 1)) {
+    if (cos_angle < min_cos_angles_[static_cast<size_t>(level)] ||
+        !(column >= 0.0 && row >= 0.0 && column < rect.width - 1 && row < rect.height - 1)) {
       return false;
     }
     const cv::Point corner(static_cast<int>(column), static_cast<int>(row));
@@ -113,7 +131,7 @@ class ViewCamera {
   const RigCamera& camera_;
   const RigidTransform camera_from_vehicle_;
   const std::optional<Eigen::Matrix<double, 6, 6>> covariance_;
-  const double min_cos_angle_;
+  std::array<double, ImagePyramid::kNumLevels> min_cos_angles_{};  // of rays to the optical axis
   ImagePyramid masks_;
 };
 

@@ -38,7 +38,7 @@ ObstacleSeams::ObstacleSeams(const ViewGrid& grid, const CameraRig& rig, const V
       is_behind_(cv::Mat::zeros(grid.sizeBlocks(), CV_8UC1)) {
   camera_positions_m_.assign(rig.cameras.size(),
                              Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  std::map<std::pair<uint8_t, uint8_t>, int> pairs;
+  std::map<std::pair<uint8_t, uint8_t>, std::vector<size_t>> pairs;
   for (int row = 0; row < cameras_.rows; ++row) {
     for (int column = 0; column < cameras_.cols; ++column) {
       const int pixel = (row * kSurroundBlock_px + kSurroundBlock_px / 2) * grid.size().width +
@@ -63,13 +63,14 @@ ObstacleSeams::ObstacleSeams(const ViewGrid& grid, const CameraRig& rig, const V
       block.first = see(first.camera, quality);
       block.second = see(second.camera, 1.0 - quality);
       if (second.camera != kNoCamera) {
-        const auto pair = std::minmax(first.camera, second.camera);
-        block.pair =
-            pairs.try_emplace({pair.first, pair.second}, static_cast<int>(pairs.size())).first->second;
+        const auto cameras = std::minmax(first.camera, second.camera);
+        pairs[{cameras.first, cameras.second}].push_back(static_cast<size_t>(row * cameras_.cols + column));
       }
     }
   }
-  num_pairs_ = static_cast<int>(pairs.size());
+  for (auto& [cameras, blocks] : pairs) {
+    pairs_.push_back(std::move(blocks));
+  }
 }
 
 void ObstacleSeams::addToHorizon(const Eigen::Vector2d& obstacle_m, double radius_m, size_t camera) {
@@ -121,15 +122,15 @@ void ObstacleSeams::update(const std::vector<Eigen::Vector2d>& obstacles_m, doub
   for (size_t i = 0; i < blocks_.size(); ++i) {
     is_hidden_.data[i] = isBehind(blocks_[i].first) || isBehind(blocks_[i].second) ? 255 : 0;
   }
-  for (int pair = 0; pair < num_pairs_; ++pair) {
+  for (const std::vector<size_t>& pair : pairs_) {
     chooseCameras(pair, has_image);
   }
 }
 
-void ObstacleSeams::chooseCameras(int pair, const std::vector<bool>& has_image) {
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    const Block& block = blocks_[i];
-    is_behind_.data[i] = block.pair == pair && (isBehind(block.first) || isBehind(block.second)) ? 255 : 0;
+void ObstacleSeams::chooseCameras(const std::vector<size_t>& pair, const std::vector<bool>& has_image) {
+  is_behind_ = 0;
+  for (const size_t i : pair) {
+    is_behind_.data[i] = is_hidden_.data[i];
   }
   const int num_components = cv::connectedComponents(is_behind_, components_, 8, CV_32S);
   struct Score {
@@ -140,7 +141,7 @@ void ObstacleSeams::chooseCameras(int pair, const std::vector<bool>& has_image) 
   };
   std::vector<Score> scores(static_cast<size_t>(num_components));
   const int* components = components_.ptr<int>();
-  for (size_t i = 0; i < blocks_.size(); ++i) {
+  for (const size_t i : pair) {
     if (components[i] == 0) {
       continue;
     }
@@ -164,7 +165,7 @@ void ObstacleSeams::chooseCameras(int pair, const std::vector<bool>& has_image) 
     }
     chosen[component] = score.cameras[score.sums[0] >= score.sums[1] ? 0 : 1];
   }
-  for (size_t i = 0; i < blocks_.size(); ++i) {
+  for (const size_t i : pair) {
     if (components[i] != 0) {
       cameras_.data[i] = chosen[static_cast<size_t>(components[i])];
     }

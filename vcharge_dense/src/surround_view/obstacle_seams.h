@@ -41,7 +41,6 @@ class ObstacleSeams {
   };
   struct Block {
     Sight first, second;
-    int pair = -1;  // number of the pair of cameras; -1: seen by one camera at most
   };
   /// Distance of the nearest obstacle in each direction from a camera.
   using Horizon = std::array<float, kNumDirections>;
@@ -51,13 +50,13 @@ class ObstacleSeams {
   }
   void addToHorizon(const Eigen::Vector2d& obstacle_m, double radius_m, size_t camera);
   void markFeet(const std::vector<Eigen::Vector2d>& obstacles_m, double radius_m);
-  void chooseCameras(int pair, const std::vector<bool>& has_image);
+  void chooseCameras(const std::vector<size_t>& pair, const std::vector<bool>& has_image);
 
   const ViewGrid grid_;
   std::vector<Eigen::Vector2d> camera_positions_m_;  // NaN for cameras that are not in use
   std::vector<Block> blocks_;                        // in row-major order
-  int num_pairs_ = 0;
-  std::vector<Horizon> horizons_;  // by camera
+  std::vector<std::vector<size_t>> pairs_;           // blocks that two cameras see, by pair of cameras
+  std::vector<Horizon> horizons_;                    // by camera
   cv::Mat cameras_, last_cameras_, is_hidden_, is_foot_, is_behind_, components_;
 };
 

@@ -94,6 +94,8 @@ void SurroundRenderer::placeObstacles(const ImageFrame& frame) {
   double radius_m = 0.0;
   if (obstacles_ && frame.odom_from_vehicle) {
     const RigidTransform vehicle_from_odom = frame.odom_from_vehicle->inverse();
+    const Eigen::Matrix2d rotation = vehicle_from_odom.rotationMatrix().topLeftCorner<2, 2>();
+    const Eigen::Vector2d translation_m = vehicle_from_odom.translation().head<2>();
     const double cell_m = obstacles_->cell_size_m;
     radius_m = cell_m * std::sqrt(0.5);
     for (int row = 0; row < obstacles_->state.rows; ++row) {
@@ -102,9 +104,9 @@ void SurroundRenderer::placeObstacles(const ImageFrame& frame) {
         if (states[column] != kCellOccupied) {
           continue;
         }
-        const Eigen::Vector3d in_odom(obstacles_->origin_m.x() + (column + 0.5) * cell_m,
-                                      obstacles_->origin_m.y() + (row + 0.5) * cell_m, 0.0);
-        const Eigen::Vector2d in_vehicle = (vehicle_from_odom * in_odom).head<2>();
+        const Eigen::Vector2d in_odom(obstacles_->origin_m.x() + (column + 0.5) * cell_m,
+                                      obstacles_->origin_m.y() + (row + 0.5) * cell_m);
+        const Eigen::Vector2d in_vehicle = rotation * in_odom + translation_m;
         const Eigen::Vector2d pixel = grid_.pixelOf(in_vehicle);
         if (pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < grid_.size().width &&
             pixel.y() < grid_.size().height && grid_.distanceToVehicle_m(in_vehicle) > 0.0) {
@@ -214,7 +216,7 @@ void SurroundRenderer::render(const ImageFrame& frame) {
   setScales();
   forEachBand(grid_.size().height, [&](int begin, int end) { composeRows(begin, end, frame.has_image); });
   if (frame.odom_from_vehicle) {
-    memory_.store(image_, labels_, seams_.isHidden(), *frame.odom_from_vehicle);
+    memory_.store(frame.stamp, image_, labels_, seams_.isHidden(), *frame.odom_from_vehicle);
     memory_.fill(*frame.odom_from_vehicle, &image_, &labels_);
   }
   car_.draw(&image_);

@@ -70,7 +70,7 @@ class ViewGrid {
 
  private:
   static constexpr double kFlatPart = 0.35;  // part of the reach over which the bowl is flat
-  static constexpr double kRimSlope = 1.5;   // slope of the bowl at its rim
+  static constexpr double kRimSlope = 0.9;   // slope of the bowl at its rim
 
   int wholeBlocks(double length_m) const {
     return kSurroundBlock_px * static_cast<int>(std::ceil(length_m / (kSurroundBlock_px * pixel_m_) - 1e-9));
