@@ -81,6 +81,26 @@ class SurroundRendererTest : public ::testing::Test {
     const Eigen::Vector2d pixel = renderer.grid().pixelOf(position_m);
     return renderer.labels().at<uint8_t>(cv::Point(cvRound(pixel.x()), cvRound(pixel.y())));
   }
+  /// Middles of the seam between the front and the left camera, at different distances from the vehicle.
+  std::vector<Eigen::Vector2d> findSeam() const {
+    SurroundRenderer renderer(rig_, options_, all(rig_));
+    renderer.render(makeTestFrame(TestWorld(), rig_, RigidTransform()));
+    std::vector<Eigen::Vector2d> middles;
+    for (double x = 4.8; x < 6.9; x += 0.5) {
+      double sum = 0.0;
+      int count = 0;
+      for (double y = 1.2; y < 4.8; y += 0.02) {
+        if (labelAt({x, y}, renderer) == kSurroundBlend) {
+          sum += y;
+          ++count;
+        }
+      }
+      if (count > 0) {
+        middles.emplace_back(x, sum / count);
+      }
+    }
+    return middles;
+  }
   static int countLabel(const SurroundRenderer& renderer, uint8_t label) {
     return cv::countNonZero(renderer.labels() == label);
   }
@@ -169,7 +189,7 @@ ShownPost findPost(const SurroundRenderer& renderer, const CameraRig& rig, const
   for (const size_t camera : {kFront, kLeft}) {
     const Eigen::Vector2d from = rig.cameras[camera].vehicle_from_camera->translation().head<2>();
     const Eigen::Vector2d direction = (post_m - from).normalized();
-    for (double distance_m = 0.3; distance_m < 1.2; distance_m += 0.05) {
+    for (double distance_m = 0.5; distance_m < 1.4; distance_m += 0.05) {
       const Eigen::Vector2d pixel = grid.pixelOf(post_m + distance_m * direction);
       const int gray = renderer.image().at<uint8_t>(cv::Point(cvRound(pixel.x()), cvRound(pixel.y())));
       (camera == kFront ? shown.by_front : shown.by_left) += gray > 150 ? 1 : 0;
@@ -182,9 +202,13 @@ TEST_F(SurroundRendererTest, ShowsAPostInAnOverlapOnceWithTheObstacleMap) {
   TestWorld world;
   world.amplitude = 20.0;
   int num_spoiled = 0;
-  // Posts around the seam between the front and the left camera.
-  for (const double angle_rad : {0.35, 0.5, 0.6, 0.7, 0.8, 1.0}) {
-    const Eigen::Vector2d post_m(3.75 + 2.5 * std::cos(angle_rad), 0.95 + 2.5 * std::sin(angle_rad));
+  // On the seam, and before it, seen from the front camera, whose image of the post crosses it.
+  std::vector<Eigen::Vector2d> posts_m = findSeam();
+  ASSERT_GE(posts_m.size(), 2U);
+  posts_m.resize(2);
+  posts_m.push_back(posts_m[0] - Eigen::Vector2d(0.0, 0.5));
+  posts_m.push_back(posts_m[1] - Eigen::Vector2d(0.0, 0.7));
+  for (const Eigen::Vector2d& post_m : posts_m) {
     world.posts = {{post_m}};
     const ImageFrame frame = makeTestFrame(world, rig_, RigidTransform());
     SurroundRenderer without(rig_, options_, all(rig_));
@@ -196,8 +220,8 @@ TEST_F(SurroundRendererTest, ShowsAPostInAnOverlapOnceWithTheObstacleMap) {
     renderer.setObstacles(mapWithObstacle(post_m, 0.15));
     renderer.render(frame);
     const ShownPost shown = findPost(renderer, rig_, post_m);
-    EXPECT_EQ(std::min(shown.by_front, shown.by_left), 0) << angle_rad;
-    EXPECT_GE(std::max(shown.by_front, shown.by_left), 15) << angle_rad;
+    EXPECT_EQ(std::min(shown.by_front, shown.by_left), 0) << post_m.transpose();
+    EXPECT_GE(std::max(shown.by_front, shown.by_left), 15) << post_m.transpose();
   }
   EXPECT_GE(num_spoiled, 1);  // otherwise the map changed nothing
 }
@@ -206,25 +230,14 @@ TEST_F(SurroundRendererTest, KeepsTheCameraThatShowsAnObstacle) {
   const TestWorld world;
   SurroundRenderer renderer(rig_, options_, all(rig_));
   const ImageFrame frame = makeTestFrame(world, rig_, RigidTransform());
+  // An obstacle that trembles across the line where both cameras see it equally well.
+  const std::vector<Eigen::Vector2d> middles_m = findSeam();
+  ASSERT_FALSE(middles_m.empty());
+  const Eigen::Vector2d middle_m = middles_m.front();
   int num_changes = 0;
   uint8_t last = kNoCamera;
-  // An obstacle that trembles across the line where both cameras see it equally well.
-  const double seam_rad = [&] {
-    for (double angle_rad = 0.3; angle_rad < 1.3; angle_rad += 0.01) {
-      const Eigen::Vector2d position_m(3.75 + 2.5 * std::cos(angle_rad), 0.95 + 2.5 * std::sin(angle_rad));
-      SurroundRenderer fresh(rig_, options_, all(rig_));
-      fresh.setObstacles(mapWithObstacle(position_m, 0.15));
-      fresh.render(frame);
-      if (labelAt(position_m, fresh) == kLeft) {
-        return angle_rad;
-      }
-    }
-    return 0.0;
-  }();
-  ASSERT_GT(seam_rad, 0.3);
   for (int i = 0; i < 10; ++i) {
-    const double angle_rad = seam_rad + (i % 2 == 0 ? 0.02 : -0.02);
-    const Eigen::Vector2d position_m(3.75 + 2.5 * std::cos(angle_rad), 0.95 + 2.5 * std::sin(angle_rad));
+    const Eigen::Vector2d position_m = middle_m + Eigen::Vector2d(0.0, i % 2 == 0 ? 0.1 : -0.1);
     renderer.setObstacles(mapWithObstacle(position_m, 0.15));
     renderer.render(frame);
     const uint8_t label = labelAt(position_m, renderer);
@@ -233,6 +246,14 @@ TEST_F(SurroundRendererTest, KeepsTheCameraThatShowsAnObstacle) {
     last = label;
   }
   EXPECT_EQ(num_changes, 0);
+  // Well on either side, it is shown by the camera that sees it best.
+  for (const auto& [offset_m, camera] : {std::make_pair(0.8, kLeft), std::make_pair(-0.8, kFront)}) {
+    const Eigen::Vector2d position_m = middle_m + Eigen::Vector2d(0.0, offset_m);
+    SurroundRenderer fresh(rig_, options_, all(rig_));
+    fresh.setObstacles(mapWithObstacle(position_m, 0.15));
+    fresh.render(frame);
+    EXPECT_EQ(labelAt(position_m, fresh), camera);
+  }
 }
 
 TEST_F(SurroundRendererTest, ShowsTheRestWithoutACamera) {
@@ -306,7 +327,9 @@ TEST_F(SurroundRendererTest, LeavesOutMasksAndTrustsTheCameraWithTheSmallerCovar
   EXPECT_EQ(countLabel(without_left, kLeft), 0);
 
   // A place that the left camera sees best, until its extrinsics are uncertain.
-  const Eigen::Vector2d position_m(4.3, 4.5);
+  const std::vector<Eigen::Vector2d> middles_m = findSeam();
+  ASSERT_FALSE(middles_m.empty());
+  const Eigen::Vector2d position_m = middles_m.front() + Eigen::Vector2d(0.0, 0.6);
   CameraRig uncertain = rig_;
   uncertain.cameras[kLeft].covariance = 4e-4 * Eigen::Matrix<double, 6, 6>::Identity();
   EXPECT_EQ(labelAt(position_m, frame, rig_), kLeft);

@@ -83,7 +83,7 @@ inline CameraRig makeTestRig() {
     camera.vehicle_from_camera = RigidTransform(Eigen::Quaterniond(rotation), position_m);
     rig.cameras.push_back(camera);
   };
-  add("front", {3.75, 0.0, 0.6}, 0.0);
+  add("front", {3.75, 0.0, 0.67}, 0.0);
   add("left", {1.9, 0.95, 0.95}, M_PI / 2.0);
   add("rear", {-0.95, 0.0, 0.8}, M_PI);
   add("right", {1.9, -0.95, 0.95}, -M_PI / 2.0);
