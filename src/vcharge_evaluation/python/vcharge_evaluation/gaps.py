@@ -85,12 +85,13 @@ def gap_figures(path, true_trajectory, obstacles):
     gaps = gaps_of(path, true_trajectory)
     for kind in ("parallel", "perpendicular"):
         found = [gap for gap in gaps if gap.kind == kind]
-        true = np.array([gap.true_length(outlines) for gap in found])
-        told = np.array([gap.length_m for gap in found])
-        right = told - true < LENGTH_TOLERANCE_M if found else np.zeros(0, bool)
-        errors = 100 * np.abs(told - true)[right] if found else np.zeros(0)
-        figures += [Figure(f"gaps, {kind}", len(found)),
-                    figure(f"gaps, {kind}: free as told", percent(int(right.sum()), len(found)), "%", at_least=98),
+        figures.append(Figure(f"gaps, {kind}", len(found)))
+        if not found:
+            continue
+        true, told = np.array([gap.true_length(outlines) for gap in found]), np.array([gap.length_m for gap in found])
+        right = told - true < LENGTH_TOLERANCE_M
+        errors = 100 * np.abs(told - true)[right]
+        figures += [figure(f"gaps, {kind}: free as told", percent(int(right.sum()), len(found)), "%", at_least=98),
                     figure(f"gaps, {kind}: error of the length, median", float(np.median(errors)) if len(errors) else None, "cm",
                            at_most=10),
                     Figure(f"gaps, {kind}: error of the length, worst", float(errors.max()) if len(errors) else None, "cm")]
