@@ -83,7 +83,7 @@ class ViewCamera {
         position_by_pixel * pixelCovariance(point, pixel_by_point) * position_by_pixel.transpose();
     *sigma_m = static_cast<float>(std::sqrt(covariance.trace()));
     const double angle_rad = std::atan2(in_camera.head<2>().norm(), in_camera.z());
-    *angle = static_cast<uint8_t>(angle_rad / M_PI * kAngleSteps + 0.5);
+    *angle = static_cast<uint8_t>(std::lround(angle_rad / M_PI * kAngleSteps));
   }
 
  private:

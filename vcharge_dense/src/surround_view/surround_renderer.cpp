@@ -52,7 +52,7 @@ ViewLayers makeLayers(const ViewGrid& grid, const CameraRig& rig, const std::vec
 }  // namespace
 
 SurroundRenderer::SurroundRenderer(const CameraRig& rig, const SurroundViewOptions& options,
-                                   std::vector<bool> is_used)
+                                   const std::vector<bool>& is_used)
     : grid_((options.validate(), options)),
       layers_(makeLayers(grid_, rig, is_used)),
       seams_(grid_, rig, layers_),

@@ -21,7 +21,8 @@ class SurroundRenderer {
  public:
   /// `is_used`: one per camera of the rig. InputError for a used camera without extrinsics, or if none sees
   /// the ground.
-  SurroundRenderer(const CameraRig& rig, const SurroundViewOptions& options, std::vector<bool> is_used);
+  SurroundRenderer(const CameraRig& rig, const SurroundViewOptions& options,
+                   const std::vector<bool>& is_used);
 
   /// Images must be CV_8UC1 of the rig's sizes.
   void render(const ImageFrame& frame);

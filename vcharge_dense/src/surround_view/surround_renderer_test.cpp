@@ -233,7 +233,7 @@ TEST_F(SurroundRendererTest, KeepsTheCameraThatShowsAnObstacle) {
   // An obstacle that trembles across the line where both cameras see it equally well.
   const std::vector<Eigen::Vector2d> middles_m = findSeam();
   ASSERT_FALSE(middles_m.empty());
-  const Eigen::Vector2d middle_m = middles_m.front();
+  const Eigen::Vector2d& middle_m = middles_m.front();
   int num_changes = 0;
   uint8_t last = kNoCamera;
   for (int i = 0; i < 10; ++i) {

@@ -179,17 +179,20 @@ std::vector<ParkingGap> GapFinder::find(const ObstacleMap& map) const {
   std::vector<ParkingGap> gaps;
   for (const double sign : {1.0, -1.0}) {
     const Side side(map, sign, vehicle_.outline().half_width_m);
-    std::optional<int> last;  // column of the last thing that stands beside the path
-    for (int i = 0; i < side.numColumns(); ++i) {
-      if (side.column(i).blocked_m > kMaxFlank_m) {
+    for (int last = 0; last < side.numColumns(); ++last) {
+      // The side of something, next to which what closes the gap stands back by the width of the vehicle.
+      const double back_m = side.column(last).blocked_m + vehicle_.width_m + kMargin_m;
+      int next = last + 1;
+      while (next < side.numColumns() && side.column(next).blocked_m >= back_m) {
+        ++next;
+      }
+      if (side.column(last).blocked_m > kMaxFlank_m || next == last + 1 || next == side.numColumns()) {
         continue;
       }
-      if (last && i > *last + 1) {
-        if (const auto gap = gapBetween(side, *last, i, vehicle_)) {
-          gaps.push_back(*gap);
-        }
+      if (const auto gap = gapBetween(side, last, next, vehicle_)) {
+        gaps.push_back(*gap);
       }
-      last = i;
+      last = next - 1;
     }
   }
   return gaps;
