@@ -24,6 +24,7 @@ STEP_BLOCK_PX = 21  # brightness is compared as means over half a metre: of sing
 LOWEST_M = 0.3  # lower obstacles, as kerbs, appear where they stand
 PART_M = 0.2  # obstacles are judged in parts of this size: a long one may be shown by several cameras, one after the other
 NEAR_CAR_M = 0.3
+KNOWN_M = 0.25  # the obstacle map has a part if a cell this near is occupied
 SHOWN_M2 = 0.05  # a camera shows a part twice if it shows more than this of it where the other one does not
 RIG_ERRORS = {"as the drive's": (0.0, 0.0), "5 mm and 0.1 degrees off": (0.005, 0.1)}
 
@@ -86,12 +87,29 @@ def shadow(grid, camera, corners, top_m):
 
 
 def parts_of(corners):
-    """Squares of PART_M along the outline of a footprint."""
+    """Squares of PART_M along the outline of a footprint; the footprint itself if it is small."""
+    if np.ptp(corners, axis=0).max() < 2 * PART_M:
+        yield corners
+        return
     square = PART_M / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     for begin, end in zip(corners, np.roll(corners, -1, axis=0)):
         count = max(1, int(np.linalg.norm(end - begin) / PART_M))
         for k in range(count):
             yield begin + (end - begin) * (k + 0.5) / count + square
+
+
+def occupied_of(folder, stamp):
+    """Positions of the occupied cells of the newest map of a stamp, in the vehicle's frame (N x 2). Maps are of the same stamps as
+    pictures, except where one could not be made."""
+    stamps = [known for known in (int(path.stem) for path in folder.glob("*.pgm")) if known <= stamp]
+    if not stamps:
+        return np.zeros((0, 2))
+    meta = yaml.safe_load((folder / f"{max(stamps)}.yaml").read_text(encoding="utf-8"))
+    rows, columns = np.nonzero(cv2.imread(str(folder / f"{max(stamps)}.pgm"), cv2.IMREAD_UNCHANGED)[::-1] == 0)
+    cells = np.column_stack([columns, rows, np.zeros(len(rows))]) + [0.5, 0.5, 0]
+    points = cells * meta["resolution"] + [*meta["origin"][:2], 0.0]
+    pose = transform(meta["fixed_from_vehicle_translation_m"], meta["fixed_from_vehicle_rotation_xyzw"])
+    return ((points - pose[:3, 3]) @ pose[:3, :3])[:, :2]
 
 
 def turned_rig(path, output, shift_m, angle_deg, seed):
@@ -181,10 +199,12 @@ def judge_ground(drive, rig, name, cameras, stamps, grid, full):
 
 
 def judge_obstacles(drive, cameras, stamps, grid, full, seen):
-    """Parts of obstacles in overlaps, and those that two cameras show at two places, summed over the pictures."""
-    num_parts, num_doubled = 0, 0
+    """For each part of an obstacle in an overlap, over all pictures: whether the obstacle map has it, and whether two cameras show it
+    at two places."""
+    found = []
     for stamp in stamps:
         truth, labels = Truth(drive.truth, stamp), picture(full, stamp, "_labels")
+        occupied = occupied_of(drive.folder / "obstacles", stamp)
         shown = {name: (labels == camera.index) | (labels == BLEND) for name, camera in cameras.items()}
         for one in [*truth.standing, *truth.moving]:
             corners = truth.footprint(one)
@@ -197,12 +217,12 @@ def judge_obstacles(drive, cameras, stamps, grid, full, seen):
                 both = [name for name in cameras if seen[name][row, column]]
                 if len(both) < 2:
                     continue
-                num_parts += 1
+                is_known = bool((np.linalg.norm(occupied - part.mean(0), axis=1) < KNOWN_M).any())
                 areas = {name: shadow(grid, cameras[name], part, one["top_z_m"]) > 0 for name in both}
                 alone = [(areas[name] & shown[name] & ~np.any([areas[other] for other in both if other != name], axis=0)).sum()
                          for name in both]
-                num_doubled += sum(pixels * PIXEL_M ** 2 > SHOWN_M2 for pixels in alone) > 1
-    return num_parts, num_doubled
+                found.append((is_known, sum(pixels * PIXEL_M ** 2 > SHOWN_M2 for pixels in alone) > 1))
+    return np.array(found, bool).reshape(-1, 2)
 
 
 def evaluate(args, scene, course, seed, condition):
@@ -216,7 +236,8 @@ def evaluate(args, scene, course, seed, condition):
     figures = []
     for error, (shift_m, angle_deg) in RIG_ERRORS.items():
         name = "view" if shift_m == 0 else "view_off"
-        rig = drive.true_rig if shift_m == 0 else turned_rig(drive.true_rig, drive.folder / "rig_off.yaml", shift_m, angle_deg, seed)
+        rig = drive.true_rig if shift_m == 0 else turned_rig(drive.true_rig, drive.true_rig.with_name("rig_off.yaml"), shift_m, angle_deg,
+                                                                             seed)
         cameras = {camera: Camera(index, transform(entry["vehicle_from_camera"]["translation_m"],
                                                    entry["vehicle_from_camera"]["rotation_xyzw"]))
                    for index, (camera, entry) in enumerate(yaml.safe_load(rig.read_text(encoding="utf-8"))["cameras"].items())}
@@ -232,14 +253,16 @@ def evaluate(args, scene, course, seed, condition):
             seen = {camera: picture(drive.folder / f"{name}_{camera}", stamps[0], "_labels") == entry.index
                     for camera, entry in cameras.items()}
             plain, _ = render(drive, rig, f"{name}_plain")
-            parts, doubled = judge_obstacles(drive, cameras, stamps, grid, full, seen)
-            _, without = judge_obstacles(drive, cameras, stamps, grid, plain, seen)
+            parts, without = (judge_obstacles(drive, cameras, stamps, grid, folder, seen) for folder in (full, plain))
+            known = parts[:, 0]
             figures += [Figure("patches of ground compared", len(errors)),
                         figure("step of the brightness at the seams, mean", float(steps.mean()) if len(steps) else None, "gray levels",
                                at_most=3.0),
-                        Figure("parts of obstacles in overlaps", parts),
-                        figure("of them shown twice", percent(doubled, parts), "%", equal=0.0),
-                        Figure("of them shown twice without an obstacle map", percent(without, parts), "%"),
+                        Figure("parts of obstacles in overlaps", len(parts)),
+                        Figure("of them in the obstacle map", percent(known.sum(), len(parts)), "%"),
+                        figure("of these shown twice", percent(parts[known, 1].sum(), known.sum()), "%", equal=0.0),
+                        Figure("of these shown twice without an obstacle map", percent(without[known, 1].sum(), known.sum()), "%"),
+                        Figure("of all shown twice", percent(parts[:, 1].sum(), len(parts)), "%"),
                         Figure("never seen", 100 * found["unknown_ratio"], "% of the view"),
                         figure("processor time", found["processor_ms_per_frame"], "ms per frame", at_most=10.0)]
     return figures
