@@ -51,7 +51,7 @@ class SurroundViewNodelet : public Nodelet, private DriveConsumer {
         },
         OrderedQueue<Task>(isLossless() ? 0 : kMaxWaitingFrames * rig_->cameras.size()));
     addDiagnostics(
-        "", [this] { return report(); }, Threads::kOne);
+        "/view", [this] { return report(); }, Threads::kOne);
     subscribe<nav_msgs::OccupancyGrid>(kGridTopic, 1, [this](const nav_msgs::OccupancyGridConstPtr& grid) {
       worker_->push([this, map = fromMessage(*grid, kGridTopic)] { view_->setObstacles(map); }, false);
     });
