@@ -153,11 +153,13 @@ class LaunchFilesTest(unittest.TestCase):
         activities = {"mapping": ("mapping", "mapping"), "localization": ("localization", "localization"),
                       "calibration": ("calibration", "calibrate_rig"), "obstacles": ("obstacles", "obstacles")}
         for options in sorted(CONFIG.glob("*.yaml")):
-            if options.stem == "calibration_in_map":  # of a tool alone
+            if options.stem in ("calibration_in_map", "vehicle"):  # of a tool alone; beside those of the obstacles
                 continue
             nodelet, launch = activities.get(options.stem, ("depth", "drive_replay"))
             config = load(LAUNCH / f"{launch}.launch", options=str(options))
             expected = yaml.safe_load(options.read_text())
+            if nodelet == "obstacles":
+                expected.update(yaml.safe_load((CONFIG / "vehicle.yaml").read_text()))
             found = {}
             for name, parameter in config.params.items():
                 if name.startswith(f"/{nodelet}/options/"):
@@ -187,7 +189,8 @@ class LaunchFilesTest(unittest.TestCase):
                    "height_map": [tool("vcharge_dense", "build_height_map")],
                    "mapping": [tool("vcharge_mapping", "build_map")],
                    "localization": [tool("vcharge_localization", "localize_drive"), "--map", "/nowhere/drive.bag"],
-                   "obstacles": [tool("vcharge_obstacles", "detect_obstacles")]}
+                   "obstacles": [tool("vcharge_obstacles", "detect_obstacles")],
+                   "vehicle": [tool("vcharge_obstacles", "detect_obstacles")]}
         dense = [tool("vcharge_dense", "compute_range_maps")]
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
             # Bag and map are read last: an error about them shows that rig and options were accepted.
