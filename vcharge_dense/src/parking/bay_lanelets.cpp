@@ -12,14 +12,13 @@
 #include <tinyxml2.h>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/dense_maps/parking_bay_file.h"
 #include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr std::array<const char*, 3> kKinds{"perpendicular", "angled", "parallel"};
-constexpr std::array<const char*, 3> kStates{"free", "occupied", "unknown"};
 
 /// The plane that touches the ellipsoid at the datum.
 class LocalPlane {
@@ -161,14 +160,14 @@ class AreaReader {
   }
 
   size_t choiceOf(const tinyxml2::XMLElement& area, int64_t id, const char* key,
-                  const std::array<const char*, 3>& names, size_t usual) const {
+                  const std::vector<std::string>& names, size_t usual) const {
     const std::optional<std::string> text = tagOf(area, key);
     if (!text) {
       return usual;
     }
     const auto name = std::find(names.begin(), names.end(), *text);
     if (name == names.end()) {
-      fail(id, std::string(names[0]) + ", " + names[1] + " or " + names[2] + " in the tag " + key);
+      fail(id, names[0] + ", " + names[1] + " or " + names[2] + " in the tag " + key);
     }
     return static_cast<size_t>(name - names.begin());
   }
@@ -181,8 +180,8 @@ class AreaReader {
     const double usual_id = static_cast<double>(std::clamp<int64_t>(id, 0, 4294967295));
     bay.id = static_cast<uint32_t>(numberOf(area, id, "bay", usual_id, kLargestNumber));
     bay.row = static_cast<uint32_t>(numberOf(area, id, "row", 0.0, kLargestNumber));
-    bay.kind = static_cast<BayKind>(choiceOf(area, id, "kind", kKinds, 0));
-    bay.state = static_cast<BayState>(choiceOf(area, id, "state", kStates, 2));
+    bay.kind = static_cast<BayKind>(choiceOf(area, id, "kind", enumNames<BayKind>(), 0));
+    bay.state = static_cast<BayState>(choiceOf(area, id, "state", enumNames<BayState>(), 2));
     bay.entry_sigma_m = numberOf(area, id, "entry_sigma", 0.0, kLargestSigma_m);
     bay.end_sigma_m = numberOf(area, id, "end_sigma", 0.0, kLargestSigma_m);
     bay.confidence = numberOf(area, id, "confidence", 1.0, 1.0);
@@ -285,8 +284,8 @@ void writeBayLanelets(const ParkingBays& bays, const MapDatum& datum, const std:
     addTag(&xml, "participant:vehicle", "yes");
     addTag(&xml, "bay", std::to_string(bay.id));
     addTag(&xml, "row", std::to_string(bay.row));
-    addTag(&xml, "kind", kKinds.at(static_cast<size_t>(bay.kind)));
-    addTag(&xml, "state", kStates.at(static_cast<size_t>(bay.state)));
+    addTag(&xml, "kind", enumNames<BayKind>().at(static_cast<size_t>(bay.kind)));
+    addTag(&xml, "state", nameOf(bay.state));
     addTag(&xml, "entry_sigma", numberText(bay.entry_sigma_m, "%.4g"));
     addTag(&xml, "end_sigma", numberText(bay.end_sigma_m, "%.4g"));
     addTag(&xml, "confidence", numberText(bay.confidence, "%.3g"));

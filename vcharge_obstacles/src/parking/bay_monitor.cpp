@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "parking/area_of_map.h"
+
 namespace vcharge {
 namespace {
 
@@ -11,9 +13,9 @@ constexpr double kConfirm_s = 0.5;
 AreaCells cellsIn(const ObstacleMap& map, const RigidTransform& fixed_from_map, Quadrangle corners_m) {
   for (Eigen::Vector2d& corner : corners_m) {
     const Eigen::Vector3d fixed_m = fixed_from_map * Eigen::Vector3d(corner.x(), corner.y(), 0.0);
-    corner = (fixed_m.head<2>() - map.origin_m) / map.cell_size_m - Eigen::Vector2d(0.5, 0.5);
+    corner = fixed_m.head<2>();
   }
-  return cellsOf(corners_m, map.state.size());
+  return cellsOf(map, corners_m);
 }
 
 int countCells(const ObstacleMap& map, const AreaCells& cells, int8_t state) {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include "vcharge_core/base/quantile.h"
+#include "parking/area_of_map.h"
 
 namespace vcharge {
 namespace {
@@ -66,11 +66,7 @@ class Side {
   std::optional<End> endIn(double from_x_m, double to_x_m, double from_out_m, double to_out_m,
                            bool is_first) const {
     std::optional<End> best;
-    Quadrangle corners_cells = rectangle(from_x_m, to_x_m, from_out_m, to_out_m);
-    for (Eigen::Vector2d& corner : corners_cells) {
-      corner = (corner - map_.origin_m) / map_.cell_size_m - Eigen::Vector2d(0.5, 0.5);
-    }
-    const AreaCells cells = cellsOf(corners_cells, map_.state.size());
+    const AreaCells cells = cellsOf(map_, rectangle(from_x_m, to_x_m, from_out_m, to_out_m));
     for (int row = 0; row < cells.box.height; ++row) {
       for (int column = 0; column < cells.box.width; ++column) {
         const cv::Point cell(cells.box.x + column, cells.box.y + row);

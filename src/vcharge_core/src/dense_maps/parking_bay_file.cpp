@@ -10,19 +10,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 #include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
-
-template <>
-inline std::vector<std::string> enumNames<BayKind>() {
-  return {"perpendicular", "angled", "parallel"};
-}
-template <>
-inline std::vector<std::string> enumNames<BayState>() {
-  return {"free", "occupied", "unknown"};
-}
 
 std::string nameOf(BayState state) {
   return enumNames<BayState>().at(static_cast<size_t>(state));
